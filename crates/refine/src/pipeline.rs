@@ -87,6 +87,7 @@ fn begin(setup: &Setup) -> PipelineState {
         frames,
         kappa: Kappa::zeros(),
         free: setup.calibration.free,
+        tested: setup.calibration.tested,
         shape: None,
         tracking: None,
         solve: None,

@@ -73,20 +73,25 @@ impl SharedBorder {
     /// Adds the prior of κ and removes the parameters that are not free from the equations.
     pub fn apply_prior(&mut self, calibration: &Calibration, kappa: &Kappa) {
         for k in 0..SHARED_PARAMETERS {
-            if calibration.free[k] {
+            if calibration.has_equations(k) {
                 let information = calibration.sigma[k].powi(-2);
                 self.own[(k, k)] += information;
                 self.gradient[k] += information * kappa[k];
             } else {
-                for block in &mut self.frames {
-                    block.column_mut(k).fill(0.0);
-                }
-                self.own.row_mut(k).fill(0.0);
-                self.own.column_mut(k).fill(0.0);
-                self.own[(k, k)] = 1.0;
-                self.gradient[k] = 0.0;
+                self.remove(k);
             }
         }
+    }
+
+    /// Removes a parameter from the equations: its step is zero.
+    pub fn remove(&mut self, k: usize) {
+        for block in &mut self.frames {
+            block.column_mut(k).fill(0.0);
+        }
+        self.own.row_mut(k).fill(0.0);
+        self.own.column_mut(k).fill(0.0);
+        self.own[(k, k)] = 1.0;
+        self.gradient[k] = 0.0;
     }
 
     /// Eliminates the frames: W, and S with `λ diag H_κκ` added.
@@ -101,15 +106,17 @@ impl SharedBorder {
         SchurComplement { w, schur }
     }
 
-    /// The damped step `(δp, δκ)`; None if S is not positive definite.
+    /// The damped step `(δp, δκ)` with the parameters `held` fixed; None if S is not positive
+    /// definite.
     pub fn step(
         &self,
         factor: &Factor,
         gradient: &[FrameStep],
-        lambda: f64,
+        (lambda, held): (f64, &[bool; SHARED_PARAMETERS]),
     ) -> Option<(Vec<FrameStep>, Kappa)> {
-        self.eliminate(factor, lambda)
-            .step(factor, gradient, &self.gradient)
+        let schur = self.eliminate(factor, lambda);
+        let step = schur.step(factor, gradient, &self.gradient)?;
+        schur.step_holding(step, &held.map(|held| held.then_some(0.0)))
     }
 }
 
@@ -167,6 +174,34 @@ impl SchurComplement {
             *step -= w * shared;
         }
         Some((step, shared))
+    }
+
+    /// From the step to the minimum, that to the minimum where the shared parameters make the steps
+    /// `held`, as far as it has values; None if S is not positive definite.
+    ///
+    /// With F the held parameters and R the others, `δκ_R` changes by `−S_RR⁻¹ S_RF` times the
+    /// change of `δκ_F`, and slots by −W times that of `δκ`.
+    pub fn step_holding(
+        &self,
+        (mut step, shared): (Vec<FrameStep>, Kappa),
+        held: &[Option<f64>; SHARED_PARAMETERS],
+    ) -> Option<(Vec<FrameStep>, Kappa)> {
+        if held.iter().all(Option::is_none) {
+            return Some((step, shared));
+        }
+        let forced = Kappa::from_fn(|k, _| held[k].map_or(0.0, |to| to - shared[k]));
+        let (mut reduced, mut right) = (self.schur, -(self.schur * forced));
+        for k in (0..SHARED_PARAMETERS).filter(|k| held[*k].is_some()) {
+            reduced.row_mut(k).fill(0.0);
+            reduced.column_mut(k).fill(0.0);
+            reduced[(k, k)] = 1.0;
+            right[k] = forced[k];
+        }
+        let change = reduced.cholesky()?.solve(&right);
+        for (step, w) in step.iter_mut().zip(&self.w) {
+            *step -= w * change;
+        }
+        Some((step, shared + change))
     }
 }
 
@@ -234,7 +269,13 @@ mod tests {
         let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
         for lambda in [0.0, 0.1] {
             let factor = symbolic.factorise(&pattern, &normal, lambda).unwrap();
-            let (step, shared) = border.step(&factor, &normal.gradient, lambda).unwrap();
+            let (step, shared) = border
+                .step(
+                    &factor,
+                    &normal.gradient,
+                    (lambda, &[false; SHARED_PARAMETERS]),
+                )
+                .unwrap();
             let damped = &dense + DMatrix::from_diagonal(&(dense.diagonal() * lambda));
             let expected = damped.lu().solve(&-&gradient).unwrap();
             for k in 0..n {

@@ -72,6 +72,9 @@ pub struct Calibration {
     pub sigma: Kappa,
     /// True for the parameters that are estimated; the others stay 0.
     pub free: [bool; SHARED_PARAMETERS],
+    /// True for the parameters that stay as they are, but whose equations are kept, so that the
+    /// solution tells whether they should be free.
+    pub tested: [bool; SHARED_PARAMETERS],
     /// Chainage of the pivot of the tilt, metres: the mean of the initial poses.
     pub middle_h_m: f64,
 }
@@ -84,6 +87,7 @@ impl Calibration {
             readout_s: 0.0,
             sigma: Kappa::repeat(1.0),
             free: [false; SHARED_PARAMETERS],
+            tested: [false; SHARED_PARAMETERS],
             middle_h_m: 0.0,
         }
     }
@@ -121,6 +125,7 @@ impl Calibration {
                     .get(k)
                     .is_some_and(|(group, _)| groups.contains(group))
             }),
+            tested: [false; SHARED_PARAMETERS],
             middle_h_m: sum / initial.len().max(1) as f64,
         }
     }
@@ -130,6 +135,7 @@ impl Calibration {
     /// A short part of the survey constrains the datum too little.
     pub fn intrinsics_only(mut self) -> Self {
         self.free[INTRINSIC_PARAMETERS..].fill(false);
+        self.tested.fill(false);
         self
     }
 
@@ -158,6 +164,11 @@ impl Calibration {
     /// True if any shared parameter is estimated.
     pub fn has_free_parameters(&self) -> bool {
         self.free.contains(&true)
+    }
+
+    /// True if the equations of a parameter are kept.
+    pub fn has_equations(&self, k: usize) -> bool {
+        self.free[k] || self.tested[k]
     }
 
     /// The camera at κ; None if its distortion is not invertible over the image.

@@ -3,7 +3,7 @@
 use crate::linear::bordered_system::SharedBorder;
 use crate::linear::normal_equations::{Block, NormalEquations};
 use crate::linear::sparse_cholesky::Factor;
-use crate::parameters::calibration::Kappa;
+use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FrameStep;
 
 /// Cost and normal equations at one estimate ([`crate::tiles::tile`]).
@@ -28,11 +28,16 @@ pub struct Linearisation {
 
 impl Linearisation {
     /// The step of all slots and of the shared parameters by a factor of the normal matrix that is
-    /// damped by λ; None if the border is not positive definite.
-    pub fn step(&self, factor: &Factor, lambda: f64) -> Option<(Vec<FrameStep>, Kappa)> {
+    /// damped by λ, with the shared parameters `held` fixed; None if the border is not positive definite.
+    pub fn step(
+        &self,
+        factor: &Factor,
+        lambda: f64,
+        held: &[bool; SHARED_PARAMETERS],
+    ) -> Option<(Vec<FrameStep>, Kappa)> {
         let gradient = &self.normal.gradient;
         match &self.border {
-            Some(border) => border.step(factor, gradient, lambda),
+            Some(border) => border.step(factor, gradient, (lambda, held)),
             None => Some((factor.step(gradient), Kappa::zeros())),
         }
     }

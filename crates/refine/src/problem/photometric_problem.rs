@@ -5,7 +5,7 @@ use crate::linear::normal_equations::Pattern;
 use crate::linear::sparse_cholesky::{FactorError, SymbolicFactorisation};
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
-use crate::parameters::calibration::{BEND_INDEX, Kappa};
+use crate::parameters::calibration::{BEND_INDEX, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use crate::parameters::shape::Shape;
 use crate::parameters::unknowns::Unknowns;
@@ -202,13 +202,19 @@ impl<'a> PhotometricProblem<'a> {
         }
     }
 
-    /// Estimates the context's free shared parameters as well, if all participants are active.
+    /// Estimates or tests the context's shared parameters as well, if all participants are active.
     pub fn with_shared_parameters(self) -> Self {
         Self {
-            estimates_shared: self.context.calibration.has_free_parameters()
+            estimates_shared: (0..SHARED_PARAMETERS)
+                .any(|k| self.context.calibration.has_equations(k))
                 && self.held_frame_count() == 0,
             ..self
         }
+    }
+
+    /// The shared parameters that are tested only.
+    pub fn tested(&self) -> &[bool; SHARED_PARAMETERS] {
+        &self.context.calibration.tested
     }
 
     /// Initial values of the unknowns.
@@ -335,7 +341,7 @@ impl<'a> PhotometricProblem<'a> {
         (surface, readout_s): (&dyn Surface, f64),
     ) -> Vec<SampledFrame<'s>> {
         let frames = self.coverage.frames(stretch).iter();
-        let may_bend = self.context.calibration.free[BEND_INDEX];
+        let may_bend = self.context.calibration.has_equations(BEND_INDEX);
         frames
             .zip(pyramids)
             .map(|(k, pyramid)| {

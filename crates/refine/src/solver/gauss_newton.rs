@@ -41,6 +41,19 @@ pub struct Solution<'a> {
     pub record: SolveRecord,
 }
 
+impl Solution<'_> {
+    /// Removes the shared parameters from the equations that are tested only.
+    pub fn remove_tested(&mut self) {
+        let at = &mut self.linearisation;
+        for border in at.border.iter_mut().chain(&mut at.border_scatter) {
+            let tested = self.problem.tested().iter().enumerate();
+            tested
+                .filter(|(_, tested)| **tested)
+                .for_each(|(k, _)| border.remove(k));
+        }
+    }
+}
+
 /// A solve between two steps; it can be resumed from there.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SolveState {
@@ -257,7 +270,7 @@ impl DampedGaussNewton {
             Err(source) if is_last_resort => return Err(problem.factor_error(source)),
             Err(_) => return Ok(None),
         };
-        match current.step(&factor, self.lambda) {
+        match current.step(&factor, self.lambda, problem.tested()) {
             None if is_last_resort => Err(problem.factor_error(FactorError::NotPositiveDefinite)),
             step => Ok(step),
         }

@@ -252,36 +252,16 @@ impl LearnedShape<'_> {
     }
 
     /// Step of all slots and of the shared parameters to the minimum where the latter make the
-    /// step `held`, as far as it has values; None if the equations are singular.
-    ///
-    /// With S and W of [`SchurComplement`], F the held parameters and R the others, the minimum
-    /// moves by `δκ_R = −S_RR⁻¹ S_RF δκ_F`, and the slots by `−W δκ`.
+    /// step `held` ([`SchurComplement::step_holding`]).
     pub fn step_holding(
         &self,
         held: &[Option<f64>; SHARED_PARAMETERS],
     ) -> Option<(Vec<FrameStep>, Kappa)> {
-        let Minimum { step, shared, .. } = &self.minimum;
-        let Some(SchurComplement { w, schur }) = &self.minimum.schur else {
-            return Some((step.clone(), *shared));
-        };
-        let mut reduced = *schur;
-        let mut change = Kappa::zeros();
-        for k in 0..SHARED_PARAMETERS {
-            if let Some(to) = held[k] {
-                change[k] = to - shared[k];
-            }
+        let step = (self.minimum.step.clone(), self.minimum.shared);
+        match &self.minimum.schur {
+            Some(schur) => schur.step_holding(step, held),
+            None => Some(step),
         }
-        let mut pull = -(schur * change);
-        for k in (0..SHARED_PARAMETERS).filter(|k| held[*k].is_some()) {
-            reduced.row_mut(k).fill(0.0);
-            reduced.column_mut(k).fill(0.0);
-            reduced[(k, k)] = 1.0;
-            pull[k] = change[k];
-        }
-        let change = reduced.cholesky()?.solve(&pull);
-        let slots = step.iter().zip(w);
-        let slots = slots.map(|(step, w)| step - w * change);
-        Some((slots.collect(), shared + change))
     }
 
     /// The shape after a step of all slots, without the dropped scales.

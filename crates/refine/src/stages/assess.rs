@@ -227,7 +227,7 @@ fn steps_left(solution: &Solution) -> Result<Vec<f64>, ProblemError> {
         .factorise(problem.pattern(), &linearisation.normal, 0.0)
         .map_err(|source| problem.factor_error(source))?;
     let (step, shared) = linearisation
-        .step(&factor, 0.0)
+        .step(&factor, 0.0, problem.tested())
         .ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))?;
     Ok(problem.wall_step_px(&solution.unknowns.frames, &step, &shared))
 }

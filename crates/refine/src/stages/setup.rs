@@ -109,6 +109,7 @@ impl<'a> Setup<'a> {
     pub fn calibration_at(&self, state: &PipelineState) -> Calibration {
         Calibration {
             free: state.free,
+            tested: state.tested,
             ..self.calibration
         }
     }

@@ -4,7 +4,9 @@
 use crate::model::problem_error::ProblemError;
 use crate::model::significance::chi_squared_bounds;
 use crate::options::RefineOptions;
-use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa};
+use crate::parameters::calibration::{
+    BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa, SHARED_PARAMETERS,
+};
 use crate::parameters::shape::{Shape, ShapeModel, ShapeStep};
 use crate::samples::footprints::footprints;
 use crate::solver::gauss_newton::Solution;
@@ -77,45 +79,39 @@ fn adopt(setup: &Setup, state: &mut PipelineState, mut shape: Shape) {
     if !shape.coefficients.iter().all(is_plausible) {
         shape.model.scales.clear();
         shape.coefficients.clear();
-        fix(LENS, setup, state);
-        fix(BEND, setup, state);
+        fix_shared(setup, state);
     }
     state.shape = Some(shape);
 }
 
-/// Fixes the shared parameters `which`, but for those that were asked for, at their given values.
-fn fix(which: Range<usize>, setup: &Setup, state: &mut PipelineState) {
-    let mut kappa = state.kappa;
-    for k in which {
-        state.free[k] = setup.calibration.free[k];
-        if !state.free[k] {
-            kappa[k] = 0.0;
-        }
-    }
+/// Fixes the shared parameters that were not asked for at their given values.
+fn fix_shared(setup: &Setup, state: &mut PipelineState) {
+    let asked_for = setup.calibration.free;
+    state.tested.fill(false);
+    let given = |k: usize| state.free[k] && !asked_for[k];
+    let kappa = Kappa::from_fn(|k, _| if given(k) { 0.0 } else { state.kappa[k] });
+    state.free = std::array::from_fn(|k| state.free[k] && asked_for[k]);
     setup.replace_kappa(state, kappa);
 }
 
 /// Learns the strengths of the shape at a full-size solution, and whether the lens differs from the
-/// given one, and the tunnel from a straight one. Returns true if that changes anything; the state is then ready for a new solve.
+/// given one, and the tunnel from a straight one. Returns true if that changes anything; the state
+/// is then where the new solve should end.
 pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution) -> bool {
     let Some(learned) = learn_shape(solution, setup.options.false_alarm_rate) else {
         return false;
     };
-    let (kappa, mut free) = (solution.linearised_at.kappa, state.free);
-    let mut hold = |which: Range<usize>, is_changed: bool| {
-        for k in which.filter(|_| !is_changed) {
-            free[k] = setup.calibration.free[k];
-        }
-    };
-    hold(
-        LENS,
-        is_changed::<INTRINSIC_PARAMETERS>(&learned, &kappa, LENS, setup.options),
-    );
-    hold(
-        BEND,
-        is_changed::<BEND_PARAMETERS>(&learned, &kappa, BEND, setup.options),
-    );
-    let held = std::array::from_fn(|k| (state.free[k] && !free[k]).then(|| -kappa[k]));
+    let kappa = solution.linearised_at.kappa;
+    let is_lens_changed = is_changed::<INTRINSIC_PARAMETERS>(&learned, &kappa, LENS, setup.options);
+    let is_bent = is_changed::<BEND_PARAMETERS>(&learned, &kappa, BEND, setup.options);
+    let has_equations = |k: usize| state.free[k] || state.tested[k];
+    let free = std::array::from_fn(|k| match k {
+        _ if LENS.contains(&k) && is_lens_changed => has_equations(k),
+        _ if BEND.contains(&k) && is_bent => has_equations(k),
+        _ => state.free[k] && setup.calibration.free[k],
+    });
+    let tested: [bool; SHARED_PARAMETERS] = std::array::from_fn(|k| has_equations(k) && !free[k]);
+    let held = std::array::from_fn(|k| tested[k].then(|| -kappa[k]));
     let Some((step, shared)) = learned.step_holding(&held) else {
         return false;
     };
@@ -127,7 +123,7 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution) -> b
     let stepped = solution
         .problem
         .stepped(&solution.linearised_at, &step, &shared);
-    state.free = free;
+    (state.free, state.tested) = (free, tested);
     setup.replace_kappa(state, stepped.kappa);
     for (estimate, stepped) in state.frames.estimates.iter_mut().zip(stepped.frames) {
         if solution.problem.is_feasible(&stepped) {

@@ -48,7 +48,7 @@ pub fn run<'a>(
     if problem.tiles() == 0 && state.frames.rejections.iter().all(Option::is_none) {
         return Ok(estimation);
     }
-    let solution = solve(&plan, problem, setup, state, session)?;
+    let mut solution = solve(&plan, problem, setup, state, session)?;
     state.frames.estimates.clone_from(&solution.unknowns.frames);
     state.kappa = solution.unknowns.kappa;
     shape::take_over(setup, state, &solution);
@@ -58,6 +58,7 @@ pub fn run<'a>(
     {
         plan_again(&plan, setup.options, state);
     }
+    solution.remove_tested();
     let uncertainty = uncertainty_of(&plan, setup, &context, state, &solution)?;
     let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
     let mut kappa = state.kappa;

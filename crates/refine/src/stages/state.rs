@@ -32,6 +32,8 @@ pub struct PipelineState {
     pub kappa: Kappa,
     /// ... and which of them are still estimated.
     pub free: [bool; SHARED_PARAMETERS],
+    /// Those that are tested for whether they should be.
+    pub tested: [bool; SHARED_PARAMETERS],
     /// The wall's shape, if it is estimated, from the first solve at full size on.
     pub shape: Option<Shape>,
     /// Tracking, if it is under way.
