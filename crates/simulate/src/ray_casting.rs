@@ -1,5 +1,6 @@
 //! Rendering of frames by ray casting.
 
+use crate::fittings::occlusion::{Candidates, Occluders};
 use crate::tunnel::{RayCaster, Tunnel, WallHit};
 use crate::wall_raster::{BATCH_POINTS, WallRaster};
 use nalgebra::Vector3;
@@ -23,6 +24,7 @@ const CELLS: usize = 2;
 pub(super) fn cast_rays(
     raster: &WallRaster,
     tunnel: &Tunnel,
+    occluders: &Occluders,
     camera: &Camera,
     pose: impl Fn(f64) -> Pose,
     n: u32,
@@ -45,6 +47,7 @@ pub(super) fn cast_rays(
         // Batches of neighbouring pixels, whose points lie close together on the wall.
         for (n, pixels) in row.chunks_mut(BATCH_POINTS).enumerate() {
             let first = n * BATCH_POINTS;
+            let candidates = occluders.towards(&lines[0].t, corners(&lines, first, pixels.len()));
             dispatch_simd(
                 #[inline(always)]
                 || {
@@ -53,7 +56,8 @@ pub(super) fn cast_rays(
                         between.interpolate(ends, down.share, first..first + pixels.len());
                         for across in &points {
                             let points = [down, across];
-                            add_points(raster, ends, &between, points, first, pixels);
+                            let scenery = (raster, &candidates);
+                            add_points(scenery, ends, &between, points, first, pixels);
                         }
                     }
                 },
@@ -69,7 +73,7 @@ pub(super) fn cast_rays(
 /// The batch starts at column `first`; `between` are the hits at the points' vertical position.
 #[inline(always)]
 fn add_points(
-    raster: &WallRaster,
+    (raster, candidates): (&WallRaster, &Candidates),
     [upper, lower]: [&RayRow; 2],
     between: &WallHits,
     [down, across]: [&SubpixelOffset; 2],
@@ -103,6 +107,12 @@ fn add_points(
         edge(left) + (edge(right) - edge(left)) * across.share
     };
     raster.add_glints(theta, h_m, d, &mut values);
+    if !candidates.is_empty() {
+        let t = upper.t + (lower.t - upper.t) * down.share;
+        for (k, value) in values.iter_mut().enumerate().take(count) {
+            *value = candidates.grey(t, d(k)).unwrap_or(*value);
+        }
+    }
     for (pixel, value) in pixels.iter_mut().zip(&values) {
         *pixel += value;
     }
@@ -182,9 +192,10 @@ impl WallHits {
 }
 
 /// Rays through the corners of cells along a line of the image, with their hits.
-#[derive(Default)]
 struct RayRow {
     at: WallHits,
+    /// Camera centre, metres.
+    t: Vector3<f64>,
     /// Directions of the rays.
     d: [Vec<Vector3<f64>>; CELLS],
 }
@@ -202,11 +213,25 @@ impl RayRow {
     }
 }
 
+/// Directions through the outer corners of `count` pixels of a row from column `first`.
+fn corners(lines: &[RayRow], first: usize, count: usize) -> [Vector3<f64>; 4] {
+    let ends = |line: &RayRow| {
+        let last = first + count - 1;
+        [line.direction(first, 0), line.direction(last, CELLS)]
+    };
+    let ([a, b], [c, d]) = (ends(&lines[0]), ends(&lines[CELLS]));
+    [a, b, c, d]
+}
+
 /// Casts the rays along the line of the image at row `v`.
 fn cast_row(caster: &RayCaster, camera: &Camera, pose: &Pose, v: f64) -> RayRow {
     let corners = camera.width as usize * CELLS + 1;
     let column = |k: usize| k as f64 / CELLS as f64 - 0.5;
-    let mut line = RayRow::default();
+    let mut line = RayRow {
+        at: WallHits::default(),
+        t: pose.t_wc,
+        d: Default::default(),
+    };
     // Without distortion the directions are linear along a row.
     if let (true, Some(first)) = (camera.lens.is_distortion_free(), camera.ray(0.0, v)) {
         let first = pose.r_wc * first;
@@ -325,7 +350,11 @@ mod tests {
     }
 
     fn shows_the_wall(raster: &WallRaster, radius_m: f64, camera: &Camera, pose: &Pose) {
-        let frame = cast_rays(raster, &Tunnel::Round(radius_m), camera, |_| *pose, 4);
+        let (tunnel, none) = (
+            Tunnel::Round(radius_m),
+            Occluders::new(Vec::new(), Illumination::Even),
+        );
+        let frame = cast_rays(raster, &tunnel, &none, camera, |_| *pose, 4);
         let mut compared = 0;
         for k in 0..160_000 {
             let (theta, h_m) = (

@@ -5,11 +5,12 @@
 //! The centreline of a curved tunnel comes from [`tunnelstitch_geometry::surface`], since it is an
 //! input; everything else is independent of it.
 
+use crate::as_built::AsBuilt;
 use crate::cross_section::CrossSection;
 use crate::error::SimulateError;
-use crate::lining::Lining;
-use crate::options::{AsBuilt, SimulateOptions};
-use crate::procedural_noise::RandomStream;
+use crate::false_position::{RayPoint, find_crossing};
+use crate::lining::lining::Lining;
+use crate::options::SimulateOptions;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use tunnelstitch_core::survey::read_centreline;
@@ -21,7 +22,7 @@ pub(super) enum Tunnel {
     /// Straight and round, with its radius in metres.
     Round(f64),
     /// Straight and round, but for the deviations of its lining.
-    AsBuilt(Lining),
+    AsBuilt(Box<Lining>),
     /// Any other cross-section or centreline.
     Shaped {
         /// The cross-section.
@@ -48,10 +49,6 @@ impl WallHit {
     };
 }
 
-/// Maximum iterations of false position.
-const MAX_FALSE_POSITION_ITERATIONS: usize = 60;
-/// Distance from the wall at which false position stops, as a share of that from the axis.
-const WALL_TOLERANCE: f64 = 1e-11;
 /// Maximum steps along a ray, each a third of the section's inner radius.
 const MAX_RAY_STEPS: usize = 2000;
 
@@ -68,12 +65,8 @@ impl Tunnel {
             if options.as_built == AsBuilt::default() {
                 return Ok(Self::Round(radius_m));
             }
-            let seed = RandomStream::Lining.seed(options.seed);
-            return Ok(Self::AsBuilt(Lining::new(
-                radius_m,
-                &options.as_built,
-                seed,
-            )));
+            let lining = Lining::new(radius_m, &options.as_built, options.seed)?;
+            return Ok(Self::AsBuilt(Box::new(lining)));
         }
         if options.as_built != AsBuilt::default() {
             return Err(fail(
@@ -113,6 +106,29 @@ impl Tunnel {
             Self::Round(radius_m) => *radius_m,
             Self::AsBuilt(lining) => lining.radius_m,
             Self::Shaped { section, .. } => section.nearest_m(),
+        }
+    }
+
+    /// Distance of the wall of a straight tunnel from its axis, metres, in the direction of the
+    /// given angle (from z towards x) at a chainage.
+    pub fn wall_distance_m(&self, angle: f64, h_m: f64) -> f64 {
+        match self {
+            Self::Round(radius_m) => *radius_m,
+            Self::AsBuilt(lining) => lining.radius_m + lining.deviation_m(angle, h_m),
+            Self::Shaped { section, .. } => 1.0 / section.g(angle.sin(), angle.cos()),
+        }
+    }
+
+    /// True if the axis is a straight line.
+    pub fn is_straight(&self) -> bool {
+        !matches!(self, Self::Shaped { line: Some(_), .. })
+    }
+
+    /// The lining as built, if it deviates from the tunnel.
+    pub fn lining(&self) -> Option<&Lining> {
+        match self {
+            Self::AsBuilt(lining) => Some(lining),
+            _ => None,
         }
     }
 
@@ -243,13 +259,55 @@ impl RayCaster<'_> {
                 beyond: lining.beyond(&point),
             }
         };
-        match self.march(&d, lining.radius_m / 3.0, point_at) {
-            Some(wall) => WallHit {
-                theta: wall.x.atan2(wall.z).rem_euclid(TAU),
-                h_m: wall.y,
+        let wall = match self.march(&d, lining.radius_m / 3.0, point_at) {
+            None => return WallHit::NONE,
+            Some([inside, outside]) => match &lining.segments {
+                None => find_crossing(inside, outside, point_at),
+                Some(rings) => {
+                    let within = [inside.distance_m, outside.distance_m];
+                    let joints = rings.joints_crossed(&self.t, &d, within);
+                    self.first_crossing(lining, &d, within, &joints)
+                }
             },
-            None => WallHit::NONE,
+        };
+        WallHit {
+            theta: wall.x.atan2(wall.z).rem_euclid(TAU),
+            h_m: wall.y,
         }
+    }
+
+    /// Finds where a ray of unit direction `d` first leaves a lining of segments between two
+    /// distances, metres, of which the second is beyond; in between it crosses joints.
+    ///
+    /// From joint to joint the wall is smooth. A ray that has left the inside when it crosses a
+    /// joint meets the side of the next segment there.
+    fn first_crossing(
+        &self,
+        lining: &Lining,
+        d: &Vector3<f64>,
+        [mut from_m, last_m]: [f64; 2],
+        joints_m: &[f64],
+    ) -> Vector3<f64> {
+        for to_m in joints_m.iter().copied().chain([last_m]) {
+            let segment = lining.segment_at(&(self.t + d * (0.5 * (from_m + to_m))));
+            let point_at = |distance_m: f64, _: f64| {
+                let point = self.t + d * distance_m;
+                RayPoint {
+                    distance_m,
+                    point,
+                    beyond: lining.beyond_in(segment, &point),
+                }
+            };
+            let [from, to] = [from_m, to_m].map(|distance_m| point_at(distance_m, 0.0));
+            if from.beyond >= 0.0 {
+                return from.point;
+            }
+            if to.beyond >= 0.0 {
+                return find_crossing(from, to, point_at);
+            }
+            from_m = to_m;
+        }
+        self.t + d * last_m
     }
 
     /// Marches a ray to the wall of a section swept along a line.
@@ -269,75 +327,35 @@ impl RayCaster<'_> {
                 beyond,
             }
         };
-        match self.march(&d, section.nearest_m() / 3.0, point_at) {
-            Some(wall) => WallHit {
-                theta: section.angle_of(wall.x, wall.z),
-                h_m: wall.y,
-            },
-            None => WallHit::NONE,
+        let Some([inside, outside]) = self.march(&d, section.nearest_m() / 3.0, point_at) else {
+            return WallHit::NONE;
+        };
+        let wall = find_crossing(inside, outside, point_at);
+        WallHit {
+            theta: section.angle_of(wall.x, wall.z),
+            h_m: wall.y,
         }
     }
 
-    /// Marches a ray of unit direction `d` in steps of `step_m` until it leaves the inside, and
-    /// finds the crossing, in the coordinates of `point_at`; None if there is none.
+    /// Marches a ray of unit direction `d` in steps of `step_m` until it leaves the inside: returns
+    /// the last point inside and the first beyond; None if there is none.
     fn march(
         &self,
         d: &Vector3<f64>,
         step_m: f64,
         point_at: impl Fn(f64, f64) -> RayPoint,
-    ) -> Option<Vector3<f64>> {
+    ) -> Option<[RayPoint; 2]> {
         let mut inside = point_at(0.0, self.h_m);
         // Chainage grows from step to step about as it did before.
         let mut growth_m = step_m * self.along.dot(d);
         for _ in 0..MAX_RAY_STEPS {
             let next = point_at(inside.distance_m + step_m, inside.point.y + growth_m);
             if next.beyond >= 0.0 {
-                return Some(find_crossing(inside, next, point_at));
+                return Some([inside, next]);
             }
             growth_m = next.point.y - inside.point.y;
             inside = next;
         }
         None
     }
-}
-
-/// Point of a ray.
-#[derive(Clone, Copy)]
-struct RayPoint {
-    /// Distance from the camera, metres.
-    distance_m: f64,
-    /// Coordinates in the section at its chainage.
-    point: Vector3<f64>,
-    /// Relative distance beyond the wall; negative inside.
-    beyond: f64,
-}
-
-/// Finds the wall between a point inside and one beyond by the Illinois variant of false position.
-///
-/// The residual of an end that is kept twice is halved.
-fn find_crossing(
-    mut inside: RayPoint,
-    mut outside: RayPoint,
-    point_at: impl Fn(f64, f64) -> RayPoint,
-) -> Vector3<f64> {
-    let mut wall = outside;
-    let mut last = None;
-    for _ in 0..MAX_FALSE_POSITION_ITERATIONS {
-        let share = inside.beyond / (inside.beyond - outside.beyond);
-        wall = point_at(
-            inside.distance_m + share * (outside.distance_m - inside.distance_m),
-            inside.point.y + share * (outside.point.y - inside.point.y),
-        );
-        if wall.beyond.abs() < WALL_TOLERANCE {
-            break;
-        }
-        let is_inside = wall.beyond < 0.0;
-        if last == Some(is_inside) {
-            let other = if is_inside { &mut outside } else { &mut inside };
-            other.beyond *= 0.5;
-        }
-        last = Some(is_inside);
-        *(if is_inside { &mut inside } else { &mut outside }) = wall;
-    }
-    wall.point
 }
