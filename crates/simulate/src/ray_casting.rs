@@ -254,6 +254,7 @@ fn cast_row(caster: &RayCaster, camera: &Camera, pose: &Pose, v: f64) -> RayRow 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fittings::solid::Solid;
     use crate::options::Illumination;
     use crate::texture::wall_texture::WallTexture;
     use tunnelstitch_geometry::camera::Lens;
@@ -378,5 +379,48 @@ mod tests {
             }
         }
         assert!(compared > 20, "{compared}");
+    }
+
+    /// The outline of a cable is where its tangents are; from another place it hides another part
+    /// of the wall.
+    #[test]
+    fn a_cable_hides_the_wall_behind_it() {
+        let (radius_m, x_m, z_m) = (0.02, 0.3, 2.9);
+        let camera = Camera::from_vertical_fov(320, 20, 0.08);
+        let (tunnel, columns) = (Tunnel::Round(3.0), 4000);
+        let texel_m = TAU * 3.0 / columns as f64;
+        let raster = WallRaster::paint(
+            &Waves,
+            Illumination::Even,
+            None,
+            columns,
+            texel_m,
+            [-1.0, 1.0],
+        );
+        let none = Occluders::new(Vec::new(), Illumination::Even);
+        let cable = Solid::vertical_cable(x_m, z_m, radius_m);
+        let cables = Occluders::new(vec![cable], Illumination::Even);
+        for camera_x_m in [0.0, 0.25] {
+            let pose = Pose::new(Default::default(), Vector3::new(camera_x_m, 0.0, 0.0));
+            let render = |occluders: &Occluders| {
+                cast_rays(&raster, &tunnel, occluders, &camera, |_| pose, 8)
+            };
+            let (bare, hidden) = (render(&none), render(&cables));
+            let (aside_m, distance_m) = (x_m - camera_x_m, (x_m - camera_x_m).hypot(z_m));
+            let edges = [-1.0, 1.0].map(|side| {
+                let angle = (aside_m / z_m).atan() + side * (radius_m / distance_m).asin();
+                camera.fx * angle.tan() + camera.cx
+            });
+            for u in 0..320 {
+                let (at, differs) = (u as f64, hidden.at(u, 9) != bare.at(u, 9));
+                let covered = (at + 0.5).min(edges[1]) - (at - 0.5).max(edges[0]);
+                // An eighth of a pixel lies between sample points.
+                if covered <= -0.01 {
+                    assert!(!differs, "{u}");
+                } else if covered > 0.13 {
+                    assert!(differs, "{u}");
+                }
+            }
+        }
     }
 }

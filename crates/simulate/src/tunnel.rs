@@ -289,13 +289,14 @@ impl RayCaster<'_> {
         joints_m: &[f64],
     ) -> Vector3<f64> {
         for to_m in joints_m.iter().copied().chain([last_m]) {
-            let segment = lining.segment_at(&(self.t + d * (0.5 * (from_m + to_m))));
+            let middle = self.t + d * (0.5 * (from_m + to_m));
+            let step_m = lining.step_m(middle.x.atan2(middle.z), middle.y);
             let point_at = |distance_m: f64, _: f64| {
                 let point = self.t + d * distance_m;
                 RayPoint {
                     distance_m,
                     point,
-                    beyond: lining.beyond_in(segment, &point),
+                    beyond: lining.beyond_with_step(step_m, &point),
                 }
             };
             let [from, to] = [from_m, to_m].map(|distance_m| point_at(distance_m, 0.0));
@@ -357,5 +358,94 @@ impl RayCaster<'_> {
             inside = next;
         }
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::as_built::Segments;
+    use tunnelstitch_core::survey::TunnelSection;
+
+    fn segmented(step_mm: f64) -> Tunnel {
+        let as_built = AsBuilt {
+            segments: Some(Segments {
+                count: 6,
+                ring_length_m: 0.5,
+                step_mm,
+                joint_mm: 0.0,
+            }),
+            ..AsBuilt::default()
+        };
+        let options = SimulateOptions {
+            tunnel: TunnelSection::round(3.0),
+            as_built,
+            ..SimulateOptions::free()
+        };
+        Tunnel::new(&options).unwrap()
+    }
+
+    /// Rays in many directions, none along the axis.
+    fn directions() -> impl Iterator<Item = Vector3<f64>> {
+        (0..400).map(f64::from).map(|k| {
+            let (sin, cos) = (2.3 * k).sin_cos();
+            Vector3::new(sin, 1.2 * (0.9 * k).sin(), cos).normalize()
+        })
+    }
+
+    /// On a segment the wall is a cylinder, whose intersection has a closed form.
+    #[test]
+    fn a_ray_meets_the_cylinder_of_its_segment() {
+        let tunnel = segmented(3.0);
+        let lining = tunnel.lining().unwrap();
+        let t = Vector3::new(0.4, 0.2, -0.6);
+        let caster = tunnel.caster_at(t);
+        let mut on_joints = 0;
+        for d in directions() {
+            let hit = caster.intersect(&d);
+            let cylinder = Tunnel::Round(3.0 + lining.deviation_m(hit.theta, hit.h_m));
+            let there = cylinder.caster_at(t).intersect(&d);
+            let is_same =
+                (there.theta - hit.theta).abs() < 1e-9 && (there.h_m - hit.h_m).abs() < 1e-9;
+            on_joints += usize::from(!is_same);
+        }
+        // Few rays meet the sides of segments, which are some millimetres high.
+        assert!(on_joints < 8, "{on_joints}");
+    }
+
+    /// Steps of 2 cm, so that sides of segments are met as well.
+    #[test]
+    fn a_ray_meets_the_first_segment_on_its_way() {
+        let tunnel = segmented(20.0);
+        let lining = tunnel.lining().unwrap();
+        let t = Vector3::new(0.4, 0.2, -0.6);
+        let caster = tunnel.caster_at(t);
+        for d in directions() {
+            let WallHit { theta, h_m } = caster.intersect(&d);
+            let step_m = 1e-4;
+            let first = (10_000..).map(|k| t + d * (f64::from(k) * step_m));
+            let first = first.into_iter().find(|point| lining.beyond(point) >= 0.0);
+            let first = first.unwrap();
+            let aside = (first.x.atan2(first.z) - theta).sin().abs();
+            assert!(
+                aside < step_m && (first.y - h_m).abs() < 2.0 * step_m,
+                "{d}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_wall_stands_where_rays_from_the_axis_meet_it() {
+        for tunnel in [segmented(3.0), Tunnel::Round(2.0)] {
+            let caster = tunnel.caster_at(Vector3::new(0.0, 0.7, 0.0));
+            for angle in [0.3, 2.0, 4.5] {
+                let d = Vector3::new(f64::sin(angle), 0.0, f64::cos(angle));
+                let hit = caster.intersect(&d);
+                assert!((hit.theta - angle).abs() < 1e-12 && hit.h_m == 0.7);
+                let wall_m = tunnel.wall_distance_m(angle, 0.7);
+                let outward = |m: f64| tunnel.radial_position(&(d * m + caster.t)).0;
+                assert!(outward(wall_m - 1e-6) < 1.0 && outward(wall_m + 1e-6) > 1.0);
+            }
+        }
     }
 }

@@ -122,3 +122,26 @@ impl Cable {
         Solid::cuboid(cuboid, Finish::Metal)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    /// Held at the brackets, lowest in the middle between them, without gaps.
+    #[test]
+    fn a_cable_hangs_between_its_brackets() {
+        let tunnel = Tunnel::Round(3.0);
+        let cable = Cable::random(&mut ChaCha8Rng::seed_from_u64(1), 1.5);
+        let node = |k: i64| cable.axis(&tunnel, 2, k);
+        let held_m = 3.0 - cable.clearance_m;
+        for end in [0, PIECES] {
+            assert!((node(end).xz().norm() - held_m).abs() < 1e-12);
+        }
+        assert_eq!(node(PIECES), cable.axis(&tunnel, 3, 0));
+        let sags_m: Vec<f64> = (0..=PIECES).map(|k| node(0).z - node(k).z).collect();
+        let middle = PIECES as usize / 2;
+        assert!((sags_m[middle] - cable.sag_m).abs() < 1e-12);
+        assert!(sags_m[..=middle].is_sorted() && sags_m[middle..].is_sorted_by(|a, b| a >= b));
+    }
+}

@@ -66,3 +66,68 @@ impl FittingLayout {
         solids
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::SimulateOptions;
+    use tunnelstitch_core::survey::{Shape, TunnelSection};
+
+    const SOME: Fittings = Fittings {
+        cables: 5,
+        lamps: 2,
+        lamp_spacing_m: 3.0,
+    };
+
+    fn tunnel(section: TunnelSection) -> Tunnel {
+        let options = SimulateOptions {
+            tunnel: section,
+            ..SimulateOptions::free()
+        };
+        Tunnel::new(&options).unwrap()
+    }
+
+    #[test]
+    fn fittings_stand_inside_round_and_square_tunnels() {
+        let square = TunnelSection {
+            shape: Shape::Box,
+            radius_m: None,
+            width_m: Some(5.0),
+            height_m: Some(4.0),
+            ..TunnelSection::round(1.0)
+        };
+        for section in [TunnelSection::round(3.0), square] {
+            let tunnel = tunnel(section);
+            for seed in 0..20 {
+                let layout = FittingLayout::new(&SOME, seed, &tunnel).unwrap();
+                let solids = layout.solids(&tunnel, [-3.0, 3.0]);
+                // Four spans of five cables, eight pieces and a bracket each; two rows of lamps.
+                assert!(solids.len() >= 4 * 5 * 9 + 2 * 2, "{}", solids.len());
+                for (centre, _) in solids.iter().map(Solid::bounding_sphere) {
+                    assert!((0.8..1.0).contains(&tunnel.radial_position(&centre).0));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_seed_decides_where_they_are_and_the_stretch_does_not() {
+        let tunnel = tunnel(TunnelSection::round(3.0));
+        let solids = |seed: u64, h_m: [f64; 2]| {
+            let layout = FittingLayout::new(&SOME, seed, &tunnel).unwrap();
+            let solids = layout.solids(&tunnel, h_m);
+            let text = solids.iter().map(|solid| format!("{solid:?}"));
+            text.collect::<Vec<String>>()
+        };
+        let (short, long) = (solids(1, [0.0, 2.0]), solids(1, [-5.0, 9.0]));
+        assert!(short.iter().all(|solid| long.contains(solid)));
+        assert!(solids(2, [0.0, 2.0]) != short);
+    }
+
+    #[test]
+    fn narrow_tunnels_have_no_room() {
+        let narrow = tunnel(TunnelSection::round(0.5));
+        assert!(FittingLayout::new(&SOME, 1, &narrow).is_err());
+        assert!(FittingLayout::new(&Fittings::default(), 1, &narrow).is_ok());
+    }
+}

@@ -82,3 +82,63 @@ impl Candidates<'_> {
         Some(occluder.solid.grey(&ray, &hit, occluder.light))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fittings::cuboid::Cuboid;
+    use crate::fittings::finish::Finish;
+    use nalgebra::Matrix3;
+
+    fn lamp(z_m: f64) -> Solid {
+        let cuboid = Cuboid {
+            centre: Vector3::new(0.0, 0.0, z_m),
+            axes: Matrix3::identity(),
+            half_m: Vector3::repeat(0.1),
+        };
+        let glass = -Vector3::z();
+        Solid::cuboid(cuboid, Finish::Lamp { glass })
+    }
+
+    #[test]
+    fn the_nearest_is_seen() {
+        let t = Vector3::zeros();
+        let (ahead, aside) = (Vector3::new(0.0, 0.02, 1.0), Vector3::new(0.0, 0.9, 1.0));
+        let solids = vec![lamp(2.9), Solid::vertical_cable(0.0, 2.5, 0.02)];
+        let occluders = Occluders::new(solids, Illumination::Even);
+        let candidates = occluders.towards(&t, [ahead; 4]);
+        // Metal that faces the camera, before glass.
+        let grey = candidates.grey(t, ahead).unwrap();
+        assert!((115.0..=120.0).contains(&grey), "{grey}");
+        let glass = candidates.grey(t, Vector3::new(0.02, 0.01, 1.0)).unwrap();
+        assert!(glass > 180.0, "{glass}");
+        assert_eq!(candidates.grey(t, Vector3::new(0.3, 0.0, 1.0)), None);
+        assert_eq!(candidates.grey(t, -ahead), None);
+        assert!(occluders.towards(&t, [aside; 4]).grey(t, aside).is_some());
+    }
+
+    /// Whatever any ray of a batch meets is among the candidates of the batch.
+    #[test]
+    fn candidates_are_all_that_rays_meet() {
+        let solids = (0..40).map(|k| Solid::vertical_cable(0.2 * f64::from(k - 20), 2.0, 0.02));
+        let occluders = Occluders::new(solids.collect(), Illumination::Even);
+        let t = Vector3::new(0.1, 0.3, 0.2);
+        let mut fewest = usize::MAX;
+        for k in 0..60 {
+            let left = -2.0 + f64::from(k) / 15.0;
+            let corner = |x: f64, y: f64| Vector3::new(x, y, 1.0);
+            let corners = [(0.0, 0.0), (0.1, 0.0), (0.0, 0.01), (0.1, 0.01)];
+            let corners = corners.map(|(right, down)| corner(left + right, down));
+            let candidates = occluders.towards(&t, corners);
+            let all = Candidates(occluders.occluders.iter().collect());
+            for step in 0..50 {
+                let d = corner(left + 0.002 * f64::from(step), 0.005);
+                assert_eq!(candidates.grey(t, d), all.grey(t, d));
+            }
+            fewest = fewest.min(candidates.0.len());
+        }
+        assert!(fewest < 40);
+        let unseen = occluders.towards(&t, [Vector3::repeat(f64::NAN); 4]);
+        assert_eq!(unseen.0.len(), 40);
+    }
+}

@@ -61,4 +61,11 @@ impl Solid {
         self.finish
             .grey(&ray.at(hit.lambda), &hit.normal, &to_camera, light)
     }
+
+    /// A metal cable along y, for tests.
+    #[cfg(test)]
+    pub fn vertical_cable(x_m: f64, z_m: f64, radius_m: f64) -> Self {
+        let ends = [-5.0, 5.0].map(|y_m| Vector3::new(x_m, y_m, z_m));
+        Self::capsule(Capsule { ends, radius_m }, Finish::Metal)
+    }
 }

@@ -5,7 +5,7 @@
 
 use crate::as_built::AsBuilt;
 use crate::error::SimulateError;
-use crate::lining::segments::{Segment, SegmentRings};
+use crate::lining::segments::SegmentRings;
 use crate::lining::shape_spline::ShapeSpline;
 use crate::lining::undulation::Undulation;
 use crate::procedural_noise::RandomStream;
@@ -43,42 +43,37 @@ impl Lining {
         })
     }
 
-    /// Deviation from the radius, metres, as if all of the wall belonged to the given segment.
-    fn deviation_in_m(&self, segment: Option<Segment>, theta: f64, h_m: f64) -> f64 {
-        let smooth_m = self.undulation.deviation_m(theta, h_m);
+    /// Deviation from the radius without the steps of segments, metres.
+    fn smooth_deviation_m(&self, theta: f64, h_m: f64) -> f64 {
+        let s_m = theta * self.radius_m;
         let shape_m = self
             .shape
             .as_ref()
-            .map_or(0.0, |shape| shape.delta_m(theta * self.radius_m, h_m));
-        let step_m = match (&self.segments, segment) {
-            (Some(rings), Some(segment)) => rings.step_m(segment),
-            _ => 0.0,
-        };
-        smooth_m + shape_m + step_m
+            .map_or(0.0, |shape| shape.delta_m(s_m, h_m));
+        self.undulation.deviation_m(theta, h_m) + shape_m
     }
 
-    /// The segment at a point of the wall, if there are any.
-    pub fn segment_at(&self, point: &Vector3<f64>) -> Option<Segment> {
-        let rings = self.segments.as_ref()?;
-        Some(rings.segment_at(point.x.atan2(point.z), point.y))
+    /// Step of the segment at a point of the wall, metres; 0 without segments.
+    pub fn step_m(&self, theta: f64, h_m: f64) -> f64 {
+        self.segments
+            .as_ref()
+            .map_or(0.0, |rings| rings.step_m(rings.segment_at(theta, h_m)))
     }
 
     /// Deviation δ from the radius, metres, positive outwards.
     pub fn deviation_m(&self, theta: f64, h_m: f64) -> f64 {
-        let rings = self.segments.as_ref();
-        self.deviation_in_m(rings.map(|rings| rings.segment_at(theta, h_m)), theta, h_m)
-    }
-
-    /// Relative distance of a point beyond the wall, as if all of the wall belonged to the given
-    /// segment; negative inside.
-    pub fn beyond_in(&self, segment: Option<Segment>, point: &Vector3<f64>) -> f64 {
-        let theta = point.x.atan2(point.z);
-        let wall_m = self.radius_m + self.deviation_in_m(segment, theta, point.y);
-        point.x.hypot(point.z) / wall_m - 1.0
+        self.smooth_deviation_m(theta, h_m) + self.step_m(theta, h_m)
     }
 
     /// Relative distance of a point beyond the wall; negative inside.
     pub fn beyond(&self, point: &Vector3<f64>) -> f64 {
-        self.beyond_in(self.segment_at(point), point)
+        self.beyond_with_step(self.step_m(point.x.atan2(point.z), point.y), point)
+    }
+
+    /// Relative distance of a point beyond the wall, as if all segments had the given step, metres;
+    /// negative inside.
+    pub fn beyond_with_step(&self, step_m: f64, point: &Vector3<f64>) -> f64 {
+        let deviation_m = self.smooth_deviation_m(point.x.atan2(point.z), point.y) + step_m;
+        point.x.hypot(point.z) / (self.radius_m + deviation_m) - 1.0
     }
 }

@@ -14,6 +14,8 @@ use std::f64::consts::TAU;
 pub(crate) struct SegmentRings {
     segments: Segments,
     seed: u64,
+    /// Sine and cosine of the angles of the joints within even and odd rings.
+    joints: [Vec<(f64, f64)>; 2],
 }
 
 /// One segment: its ring, and its number in the ring.
@@ -26,7 +28,15 @@ pub(crate) struct Segment {
 impl SegmentRings {
     /// The rings of validated options.
     pub fn new(segments: Segments, seed: u64) -> Self {
-        Self { segments, seed }
+        let joints = [0, 1].map(|ring| {
+            let angles = joint_angles(segments.count, ring);
+            angles.map(f64::sin_cos).collect()
+        });
+        Self {
+            segments,
+            seed,
+            joints,
+        }
     }
 
     /// Length of a ring, metres.
@@ -59,10 +69,9 @@ impl SegmentRings {
         1e-3 * self.segments.step_mm * normal(self.seed, segment.ring, segment.number)
     }
 
-    /// Angles of the joints of a ring, radians in `[0, 2π)`.
+    /// Angles of the joints within a ring, radians in `[0, 2π)`.
     pub fn joint_angles(&self, ring: i64) -> impl Iterator<Item = f64> {
-        let count = self.segments.count;
-        (0..count).map(move |k| (f64::from(k) + stagger(ring)) * TAU / f64::from(count))
+        joint_angles(self.segments.count, ring)
     }
 
     /// Distances at which the ray `t + λ d` crosses joints, for λ from `within[0]` to `within[1]`
@@ -78,7 +87,7 @@ impl SegmentRings {
             if ring > first {
                 crossed.push((ring as f64 * self.segments.ring_length_m - t.y) / d.y);
             }
-            for (sin, cos) in self.joint_angles(ring).map(f64::sin_cos) {
+            for (sin, cos) in &self.joints[ring.rem_euclid(2) as usize] {
                 let lambda = (t.z * sin - t.x * cos) / (d.x * cos - d.z * sin);
                 let point = t + d * lambda;
                 let is_near_half = point.x * sin + point.z * cos > 0.0;
@@ -91,6 +100,11 @@ impl SegmentRings {
         crossed.sort_unstable_by(f64::total_cmp);
         crossed
     }
+}
+
+/// Angles of the joints within a ring of `count` segments, radians in `[0, 2π)`.
+fn joint_angles(count: u32, ring: i64) -> impl Iterator<Item = f64> {
+    (0..count).map(move |k| (f64::from(k) + stagger(ring)) * TAU / f64::from(count))
 }
 
 /// Turn of a ring, segments.
