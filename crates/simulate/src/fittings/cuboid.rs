@@ -82,14 +82,10 @@ mod tests {
             [0.0, 0.0, 1.0],
         );
         assert!((turned.unwrap().lambda - 2.9).abs() < 1e-12);
-        // Turned by 45°, its edge is nearest.
-        let edge = hit(
-            0.125 * std::f64::consts::TAU,
-            [0.1 * 2f64.sqrt(), 1.0, 0.0],
-            [0.0, 0.0, 1.0],
-        );
-        let lambda = edge.unwrap().lambda;
-        assert!((2.6..2.9).contains(&lambda), "{lambda}");
+        // Turned by 45°, its long side is the plane x = z − 3 + 0.1 √2.
+        let aside = [0.1 * 2f64.sqrt(), 1.0, 0.0];
+        let side = hit(0.125 * std::f64::consts::TAU, aside, [0.0, 0.0, 1.0]);
+        assert!((side.unwrap().lambda - 3.0).abs() < 1e-12);
     }
 
     #[test]
@@ -98,7 +94,7 @@ mod tests {
             ([0.11, 1.0, 0.0], [0.0, 0.0, 1.0]),
             ([0.0, 1.21, 0.0], [0.0, 0.0, 1.0]),
             ([0.0, 1.0, 0.0], [0.0, 0.0, -1.0]),
-            ([0.6, 1.0, 2.0], [-0.4, 0.0, 1.0]),
+            ([0.6, 1.0, 2.0], [-0.3, 0.0, 1.0]),
             ([0.0, 1.0, 0.0], [f64::NAN; 3]),
         ] {
             assert_eq!(hit(0.0, t, d), None, "{t:?} {d:?}");

@@ -90,11 +90,11 @@ mod tests {
     use crate::fittings::finish::Finish;
     use nalgebra::Matrix3;
 
-    fn lamp(z_m: f64) -> Solid {
+    fn lamp(x_m: f64, z_m: f64) -> Solid {
         let cuboid = Cuboid {
-            centre: Vector3::new(0.0, 0.0, z_m),
+            centre: Vector3::new(x_m, 0.3, z_m),
             axes: Matrix3::identity(),
-            half_m: Vector3::repeat(0.1),
+            half_m: Vector3::new(0.1, 0.4, 0.1),
         };
         let glass = -Vector3::z();
         Solid::cuboid(cuboid, Finish::Lamp { glass })
@@ -104,7 +104,7 @@ mod tests {
     fn the_nearest_is_seen() {
         let t = Vector3::zeros();
         let (ahead, aside) = (Vector3::new(0.0, 0.02, 1.0), Vector3::new(0.0, 0.9, 1.0));
-        let solids = vec![lamp(2.9), Solid::vertical_cable(0.0, 2.5, 0.02)];
+        let solids = vec![lamp(0.0, 2.9), Solid::vertical_cable(0.0, 2.5, 0.02)];
         let occluders = Occluders::new(solids, Illumination::Even);
         let candidates = occluders.towards(&t, [ahead; 4]);
         // Metal that faces the camera, before glass.
@@ -120,7 +120,7 @@ mod tests {
     /// Whatever any ray of a batch meets is among the candidates of the batch.
     #[test]
     fn candidates_are_all_that_rays_meet() {
-        let solids = (0..40).map(|k| Solid::vertical_cable(0.2 * f64::from(k - 20), 2.0, 0.02));
+        let solids = (0..40).map(|k| lamp(0.25 * f64::from(k - 20), 2.0));
         let occluders = Occluders::new(solids.collect(), Illumination::Even);
         let t = Vector3::new(0.1, 0.3, 0.2);
         let mut fewest = usize::MAX;
