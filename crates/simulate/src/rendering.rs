@@ -21,8 +21,8 @@ const STRIP_ROWS: usize = 128;
 impl Scene {
     /// Renders a frame without sensor noise, faults, rounding and saturation, in grey levels.
     ///
-    /// Wet patches and their reflections, cables, lamps, moving objects, vignetting, the rig's shaft, gain and
-    /// bias are included.
+    /// Wet patches and their reflections, cables, lamps, moving objects, vignetting, the rig's
+    /// shaft, gain and bias are included.
     ///
     /// # Panics
     /// If there is no such frame.

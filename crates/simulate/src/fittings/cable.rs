@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 const BRACKET_SPACING_M: f64 = 1.5;
 /// Length of a bracket along the tunnel, metres.
 const BRACKET_LENGTH_M: f64 = 0.03;
-/// How far a bracket reaches beyond the cable, metres.
+/// Length of a bracket beyond the cable, to the sides and inwards, metres.
 const BRACKET_RIM_M: f64 = 0.01;
 /// Straight pieces from bracket to bracket.
 const PIECES: i64 = 8;
