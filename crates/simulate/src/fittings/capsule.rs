@@ -18,8 +18,8 @@ impl Capsule {
     /// Intersects a ray that starts outside; `None` if it misses.
     ///
     /// With the axis `b` from end to end and the ray's start `o` from the first end, the cylinder
-    /// is `|o + λ d|² b² − (b·(o + λ d))² = r² b²`. If the first of its two solutions lies beyond an
-    /// end, the ray can only meet the sphere there, `|o' + λ d| = r`.
+    /// is `|o + λ d|² b² − (b·(o + λ d))² = r² b²`. If the first of its two solutions lies beyond
+    /// an end, the ray can only meet the sphere there, `|o' + λ d| = r`.
     pub fn intersect(&self, ray: &Ray) -> Option<RayHit> {
         let (b, o, d) = (self.ends[1] - self.ends[0], ray.t - self.ends[0], ray.d);
         let (bb, bd, bo) = (b.norm_squared(), b.dot(&d), b.dot(&o));
