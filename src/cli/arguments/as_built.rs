@@ -22,7 +22,7 @@ pub struct AsBuiltArguments {
     /// tunnels only.
     #[arg(long, value_name = "N")]
     segments: Option<u32>,
-    /// Length of a ring of segments.
+    /// Length of a ring of segments, metres.
     #[arg(long, value_name = "M", default_value_t = 1.5, requires = "segments")]
     ring_length_m: f64,
     /// Steps between segments: 1-σ of their radial positions, which are independent.
@@ -43,7 +43,7 @@ pub struct AsBuiltArguments {
     /// Straight tunnels only.
     #[arg(long, value_name = "N", default_value_t = 0)]
     lamps: u32,
-    /// Distance between the lamps of a row.
+    /// Distance between the lamps of a row, metres.
     #[arg(long, value_name = "M", default_value_t = 3.0, requires = "lamps")]
     lamp_spacing_m: f64,
 }
