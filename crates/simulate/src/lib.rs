@@ -44,6 +44,7 @@ mod texture;
 mod tunnel;
 mod vignetting;
 mod visible_wall;
+mod wall_intersection;
 mod wall_raster;
 mod wet_patches;
 

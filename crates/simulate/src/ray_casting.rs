@@ -1,7 +1,8 @@
 //! Rendering of frames by ray casting.
 
 use crate::fittings::occlusion::{Candidates, Occluders};
-use crate::tunnel::{RayCaster, Tunnel, WallHit};
+use crate::tunnel::Tunnel;
+use crate::wall_intersection::{RayCaster, WallHit};
 use crate::wall_raster::{BATCH_POINTS, WallRaster};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
@@ -33,7 +34,7 @@ pub(super) fn cast_rays(
     let points: Vec<SubpixelOffset> = (0..n).map(|k| SubpixelOffset::new(k, n)).collect();
     let line = |v: f64| {
         let pose = pose(v);
-        let caster = tunnel.caster_at(pose.t_wc);
+        let caster = RayCaster::new(tunnel, pose.t_wc);
         cast_row(&caster, camera, &pose, v)
     };
     let share = 1.0 / (n * n) as f32;
@@ -280,7 +281,7 @@ mod tests {
     #[test]
     fn a_hit_lies_on_the_wall_and_on_the_ray() {
         let tunnel = Tunnel::Round(2.0);
-        let caster = tunnel.caster_at(Vector3::new(0.9, 7.0, -1.1));
+        let caster = RayCaster::new(&tunnel, Vector3::new(0.9, 7.0, -1.1));
         for k in 0..50 {
             let k = f64::from(k);
             let d = Vector3::new((1.7 * k).sin(), 0.8 * (0.9 * k).cos(), (2.3 * k).cos());
@@ -301,7 +302,7 @@ mod tests {
             Vector3::new(0.4, 0.3, -0.2),
         );
         let tunnel = Tunnel::Round(2.0);
-        let caster = tunnel.caster_at(pose.t_wc);
+        let caster = RayCaster::new(&tunnel, pose.t_wc);
         let mut camera = Camera::from_vertical_fov(160, 120, 1.0);
         for k1 in [0.0, -0.08] {
             camera.lens = Lens::radial(k1, 0.0);
