@@ -24,6 +24,7 @@ mod resume;
 mod rolling;
 mod shapes;
 mod simulate;
+mod simulated_walls;
 mod super_resolve;
 mod support;
 mod verdict;

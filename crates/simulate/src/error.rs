@@ -3,6 +3,7 @@
 use crate::bad_frames::BadFramesError;
 use std::path::PathBuf;
 use tunnelstitch_core::persist::atomic::WriteError;
+use tunnelstitch_core::survey::SurveyError;
 
 /// Reason why a survey cannot be simulated.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +26,9 @@ pub enum SimulateError {
         /// Description of the problem.
         what: String,
     },
+    /// The shape.json of the lining cannot be used.
+    #[error(transparent)]
+    ShapeFile(#[from] SurveyError),
     /// A true pose lies outside of the tunnel.
     #[error(
         "frame {frame}: the camera would stand {distance_m:.3} m off the axis, in the wall or \
@@ -58,4 +62,15 @@ pub enum SimulateError {
     /// An output cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+/// Passes a good value; the error says `what` is wrong with another.
+pub(crate) fn check_option(good: bool, what: &str) -> Result<(), SimulateError> {
+    if good {
+        Ok(())
+    } else {
+        Err(SimulateError::Option {
+            what: what.to_owned(),
+        })
+    }
 }

@@ -1,7 +1,9 @@
 //! Options of a simulated survey.
 
+use crate::as_built::AsBuilt;
 use crate::bad_frames::BadFrames;
-use crate::error::SimulateError;
+use crate::error::{SimulateError, check_option};
+use crate::fittings::fitting_options::Fittings;
 use crate::sensor::BitDepth;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -43,27 +45,6 @@ pub enum Illumination {
     Even,
 }
 
-/// Deviation of a straight round lining from its radius.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct AsBuilt {
-    /// Amplitude of the ovality, a second harmonic along all of the tunnel, millimetres.
-    pub ovality_mm: f64,
-    /// Undulation, root mean square, millimetres.
-    pub undulation_mm: f64,
-    /// Length ℓ of the undulation's correlation `exp(−x²/2ℓ²)`, metres.
-    pub undulation_length_m: f64,
-}
-
-impl Default for AsBuilt {
-    fn default() -> Self {
-        Self {
-            ovality_mm: 0.0,
-            undulation_mm: 0.0,
-            undulation_length_m: 0.5,
-        }
-    }
-}
-
 /// Options of a simulated survey.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SimulateOptions {
@@ -93,6 +74,9 @@ pub struct SimulateOptions {
     /// Deviation of the lining from the tunnel, which the survey does not know.
     #[serde(skip_serializing_if = "is_default")]
     pub as_built: AsBuilt,
+    /// Cables and lamps before the wall, which the survey does not know.
+    #[serde(skip_serializing_if = "is_default")]
+    pub fittings: Fittings,
     /// Appearance of the wall.
     pub wall: Wall,
     /// Illumination of the wall.
@@ -135,17 +119,6 @@ pub struct SimulateOptions {
     pub seed: u64,
 }
 
-/// Passes a good value; the error says `what` is wrong with another.
-fn check(good: bool, what: &str) -> Result<(), SimulateError> {
-    if good {
-        Ok(())
-    } else {
-        Err(SimulateError::Option {
-            what: what.to_owned(),
-        })
-    }
-}
-
 /// True for the default interval, which the record leaves out.
 fn is_one_second(value: &f64) -> bool {
     *value == 1.0
@@ -173,6 +146,7 @@ impl SimulateOptions {
             light: Illumination::Downward,
             noise_grey: 2.0,
             as_built: AsBuilt::default(),
+            fittings: Fittings::default(),
             gain_percent: 0.0,
             bias_grey: 0.0,
             lamp_corner: None,
@@ -236,54 +210,54 @@ impl SimulateOptions {
     pub(super) fn validate(&self) -> Result<(), SimulateError> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let not_negative = |v: f64| v.is_finite() && v >= 0.0;
-        check(
+        check_option(
             (1..=1_000_000).contains(&self.frames),
             "the number of frames must lie between 1 and 1000000",
         )?;
-        check(
+        check_option(
             (0.01..=1000.0).contains(&self.tunnel.nominal_m()),
             "the radius (half the width) must lie between 0.01 and 1000 metres",
         )?;
         let side = |pixels| (16..=16_384).contains(&pixels);
-        check(
+        check_option(
             side(self.camera.width) && side(self.camera.height),
             "a frame must be 16 to 16384 pixels wide and high",
         )?;
         let camera = &self.camera;
         let numbers = [camera.fx, camera.fy, camera.cx, camera.cy];
-        check(
+        check_option(
             numbers.iter().all(|v| v.is_finite()) && positive(camera.fx) && positive(camera.fy),
             "the focal lengths must be positive, and the field of view below 180 degrees",
         )?;
-        check(
+        check_option(
             camera.visible_fraction() > 0.0,
             "the lens must show some part of the image",
         )?;
-        check(
+        check_option(
             self.advance_m.abs() <= 1000.0 && self.turn_deg.is_finite(),
             "the advance must be no more than 1000 metres a frame, and the turn finite",
         )?;
-        check(
+        check_option(
             self.offset_m.iter().all(|v| v.is_finite()),
             "the offset must be finite",
         )?;
         if let Some(jitter) = &self.jitter {
-            check(
+            check_option(
                 not_negative(jitter.rotation_sigma_deg)
                     && jitter.translation_sigma_m.iter().all(|v| not_negative(*v)),
                 "the sigmas of the jitter must not be negative",
             )?;
         }
-        check(
+        check_option(
             positive(self.interval_s),
             "the time from frame to frame must be a positive number of seconds",
         )?;
-        check(
+        check_option(
             (1e-3 * self.readout_ms).abs() < self.interval_s,
             "reading out a frame must take less time than the interval between frames",
         )?;
         if let Wall::Texture { width_m, .. } = self.wall {
-            check(
+            check_option(
                 positive(width_m),
                 "the width of the texture must be a positive number of metres",
             )?;
@@ -293,47 +267,38 @@ impl SimulateOptions {
 
     /// Checks what makes the survey differ from an ideal one.
     fn validate_degradations(&self) -> Result<(), SimulateError> {
-        let built = &self.as_built;
-        let most_mm = 50.0 * self.tunnel.nominal_m();
-        let deviates = |mm: f64| (0.0..=most_mm).contains(&mm);
-        check(
-            deviates(built.ovality_mm) && deviates(built.undulation_mm),
-            "the lining may deviate by no more than a twentieth of the radius",
-        )?;
-        check(
-            built.undulation_mm == 0.0
-                || built.undulation_length_m >= 0.02 * self.tunnel.nominal_m(),
-            "the undulation must be at least a fiftieth of the radius long",
-        )?;
-        check(
+        let radius_m = self.tunnel.nominal_m();
+        self.as_built.validate(radius_m)?;
+        self.fittings.validate()?;
+        check_option(
             self.noise_grey.is_finite() && self.noise_grey >= 0.0,
             "the noise must not be negative",
         )?;
-        check(
+        check_option(
             (1..=16).contains(&self.supersample),
             "1 to 16 points may be sampled along each side of a pixel",
         )?;
-        check(
+        check_option(
             (0.0..100.0).contains(&self.gain_percent),
             "the gain may vary by 0 to less than 100 percent",
         )?;
-        check(
+        check_option(
             (0.0..=255.0).contains(&self.bias_grey),
             "the bias may vary by 0 to 255 grey levels",
         )?;
-        check(
+        check_option(
             self.lamp_corner.is_none_or(|c| c > 0.0 && c <= 1.0),
             "the lamp's light in the corner must be a share above 0 and up to 1",
         )?;
-        check(
+        check_option(
             (0.0..=90.0).contains(&self.specular_percent),
             "wet patches may cover 0 to 90 percent of the wall",
         )?;
-        check(
+        check_option(
             self.moving <= 10_000,
             "there may be no more than 10000 moving objects in a frame",
         )?;
-        check(
+        check_option(
             (0.0..=50.0).contains(&self.shaft_percent),
             "the shaft may be 0 to 50 percent of a frame wide",
         )?;

@@ -2,6 +2,7 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
 
 /// Hashes three integers to 64 well-mixed bits.
 ///
@@ -19,6 +20,14 @@ fn hash(seed: u64, i: i64, j: i64) -> u64 {
 /// Uniform number in `[0, 1)` of the lattice point `(i, j)`.
 pub(super) fn uniform(seed: u64, i: i64, j: i64) -> f32 {
     (hash(seed, i, j) >> 40) as f32 / (1u64 << 24) as f32
+}
+
+/// Standard normal number of the lattice point `(i, j)`.
+///
+/// Source: G. E. P. Box, M. E. Muller, "A note on the generation of random normal deviates", 1958.
+pub(super) fn normal(seed: u64, i: i64, j: i64) -> f64 {
+    let [u, v] = [0, 1].map(|stream| f64::from(uniform(derived_seed(seed, stream), i, j)));
+    (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos()
 }
 
 /// Derives the seed of an independent random stream.
@@ -41,8 +50,12 @@ pub(super) enum RandomStream {
     MovingObjects,
     /// Blur and occlusion of bad frames.
     BadFrames,
-    /// Deviation of the lining.
+    /// Ovality and undulation of the lining.
     Lining,
+    /// Steps of the lining's segments.
+    Segments,
+    /// Places and looks of cables and lamps.
+    Fittings,
 }
 
 impl RandomStream {
@@ -99,6 +112,19 @@ impl ValueNoise {
         }
     }
 
+    /// The noise at a point of the plane, grey levels.
+    pub fn at(&self, s_m: f64, h_m: f64) -> f32 {
+        let (x, y) = (s_m / self.cell_m[0], h_m / self.cell_m[1]);
+        let (i, j) = (x.floor(), y.floor());
+        let [fx, fy] = [x - i, y - j].map(|share| smoothstep(share as f32));
+        let (i, j) = (i as i64, j as i64);
+        let row = |j: i64| self.period_h.map_or(j, |period| j.rem_euclid(period));
+        let node = |i: i64, j: i64| uniform(self.seed, i.rem_euclid(self.period_s), row(j));
+        let along = |j: i64| node(i, j) + (node(i + 1, j) - node(i, j)) * fx;
+        let (a, b) = (along(j), along(j + 1));
+        self.amplitude * (2.0 * (a + (b - a) * fy) - 1.0)
+    }
+
     /// Adds the noise at chainage `h_m` to the row of texels at `s = (k + ½) texel_m`.
     pub fn add_to_row(&self, h_m: f64, texel_m: f64, row: &mut [f32]) {
         let y = h_m / self.cell_m[1];
@@ -145,6 +171,17 @@ mod tests {
                 .sum::<f64>()
                 / (n * n) as f64;
             assert!(covariance.abs() < 0.002, "{stride}: {covariance}");
+        }
+    }
+
+    #[test]
+    fn noise_at_a_point_is_that_of_a_row() {
+        let noise = ValueNoise::unique(3, 5.0, 0.04, 0.5);
+        let mut row = vec![0.0; 100];
+        noise.add_to_row(0.333, 0.005, &mut row);
+        for (k, value) in row.iter().enumerate() {
+            let at = noise.at((k as f64 + 0.5) * 0.005, 0.333);
+            assert!((at - value).abs() < 1e-4);
         }
     }
 

@@ -1,6 +1,8 @@
 //! Rendering of frames by ray casting.
 
-use crate::tunnel::{RayCaster, Tunnel, WallHit};
+use crate::fittings::occlusion::{Candidates, Occluders};
+use crate::tunnel::Tunnel;
+use crate::wall_intersection::{RayCaster, WallHit};
 use crate::wall_raster::{BATCH_POINTS, WallRaster};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
@@ -23,6 +25,7 @@ const CELLS: usize = 2;
 pub(super) fn cast_rays(
     raster: &WallRaster,
     tunnel: &Tunnel,
+    occluders: &Occluders,
     camera: &Camera,
     pose: impl Fn(f64) -> Pose,
     n: u32,
@@ -31,7 +34,7 @@ pub(super) fn cast_rays(
     let points: Vec<SubpixelOffset> = (0..n).map(|k| SubpixelOffset::new(k, n)).collect();
     let line = |v: f64| {
         let pose = pose(v);
-        let caster = tunnel.caster_at(pose.t_wc);
+        let caster = RayCaster::new(tunnel, pose.t_wc);
         cast_row(&caster, camera, &pose, v)
     };
     let share = 1.0 / (n * n) as f32;
@@ -45,6 +48,7 @@ pub(super) fn cast_rays(
         // Batches of neighbouring pixels, whose points lie close together on the wall.
         for (n, pixels) in row.chunks_mut(BATCH_POINTS).enumerate() {
             let first = n * BATCH_POINTS;
+            let candidates = occluders.towards(&lines[0].t, corners(&lines, first, pixels.len()));
             dispatch_simd(
                 #[inline(always)]
                 || {
@@ -53,7 +57,8 @@ pub(super) fn cast_rays(
                         between.interpolate(ends, down.share, first..first + pixels.len());
                         for across in &points {
                             let points = [down, across];
-                            add_points(raster, ends, &between, points, first, pixels);
+                            let scenery = (raster, &candidates);
+                            add_points(scenery, ends, &between, points, first, pixels);
                         }
                     }
                 },
@@ -69,7 +74,7 @@ pub(super) fn cast_rays(
 /// The batch starts at column `first`; `between` are the hits at the points' vertical position.
 #[inline(always)]
 fn add_points(
-    raster: &WallRaster,
+    (raster, candidates): (&WallRaster, &Candidates),
     [upper, lower]: [&RayRow; 2],
     between: &WallHits,
     [down, across]: [&SubpixelOffset; 2],
@@ -103,6 +108,12 @@ fn add_points(
         edge(left) + (edge(right) - edge(left)) * across.share
     };
     raster.add_glints(theta, h_m, d, &mut values);
+    if !candidates.is_empty() {
+        let t = upper.t + (lower.t - upper.t) * down.share;
+        for (k, value) in values.iter_mut().enumerate().take(count) {
+            *value = candidates.grey(t, d(k)).unwrap_or(*value);
+        }
+    }
     for (pixel, value) in pixels.iter_mut().zip(&values) {
         *pixel += value;
     }
@@ -182,9 +193,10 @@ impl WallHits {
 }
 
 /// Rays through the corners of cells along a line of the image, with their hits.
-#[derive(Default)]
 struct RayRow {
     at: WallHits,
+    /// Camera centre, metres.
+    t: Vector3<f64>,
     /// Directions of the rays.
     d: [Vec<Vector3<f64>>; CELLS],
 }
@@ -202,11 +214,25 @@ impl RayRow {
     }
 }
 
+/// Directions through the outer corners of `count` pixels of a row from column `first`.
+fn corners(lines: &[RayRow], first: usize, count: usize) -> [Vector3<f64>; 4] {
+    let ends = |line: &RayRow| {
+        let last = first + count - 1;
+        [line.direction(first, 0), line.direction(last, CELLS)]
+    };
+    let ([a, b], [c, d]) = (ends(&lines[0]), ends(&lines[CELLS]));
+    [a, b, c, d]
+}
+
 /// Casts the rays along the line of the image at row `v`.
 fn cast_row(caster: &RayCaster, camera: &Camera, pose: &Pose, v: f64) -> RayRow {
     let corners = camera.width as usize * CELLS + 1;
     let column = |k: usize| k as f64 / CELLS as f64 - 0.5;
-    let mut line = RayRow::default();
+    let mut line = RayRow {
+        at: WallHits::default(),
+        t: pose.t_wc,
+        d: Default::default(),
+    };
     // Without distortion the directions are linear along a row.
     if let (true, Some(first)) = (camera.lens.is_distortion_free(), camera.ray(0.0, v)) {
         let first = pose.r_wc * first;
@@ -229,6 +255,7 @@ fn cast_row(caster: &RayCaster, camera: &Camera, pose: &Pose, v: f64) -> RayRow 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fittings::solid::Solid;
     use crate::options::Illumination;
     use crate::texture::wall_texture::WallTexture;
     use tunnelstitch_geometry::camera::Lens;
@@ -254,7 +281,7 @@ mod tests {
     #[test]
     fn a_hit_lies_on_the_wall_and_on_the_ray() {
         let tunnel = Tunnel::Round(2.0);
-        let caster = tunnel.caster_at(Vector3::new(0.9, 7.0, -1.1));
+        let caster = RayCaster::new(&tunnel, Vector3::new(0.9, 7.0, -1.1));
         for k in 0..50 {
             let k = f64::from(k);
             let d = Vector3::new((1.7 * k).sin(), 0.8 * (0.9 * k).cos(), (2.3 * k).cos());
@@ -275,7 +302,7 @@ mod tests {
             Vector3::new(0.4, 0.3, -0.2),
         );
         let tunnel = Tunnel::Round(2.0);
-        let caster = tunnel.caster_at(pose.t_wc);
+        let caster = RayCaster::new(&tunnel, pose.t_wc);
         let mut camera = Camera::from_vertical_fov(160, 120, 1.0);
         for k1 in [0.0, -0.08] {
             camera.lens = Lens::radial(k1, 0.0);
@@ -325,7 +352,11 @@ mod tests {
     }
 
     fn shows_the_wall(raster: &WallRaster, radius_m: f64, camera: &Camera, pose: &Pose) {
-        let frame = cast_rays(raster, &Tunnel::Round(radius_m), camera, |_| *pose, 4);
+        let (tunnel, none) = (
+            Tunnel::Round(radius_m),
+            Occluders::new(Vec::new(), Illumination::Even),
+        );
+        let frame = cast_rays(raster, &tunnel, &none, camera, |_| *pose, 4);
         let mut compared = 0;
         for k in 0..160_000 {
             let (theta, h_m) = (
@@ -349,5 +380,48 @@ mod tests {
             }
         }
         assert!(compared > 20, "{compared}");
+    }
+
+    /// The outline of a cable is where its tangents are; from another place it hides another part
+    /// of the wall.
+    #[test]
+    fn a_cable_hides_the_wall_behind_it() {
+        let (radius_m, x_m, z_m) = (0.02, 0.3, 2.9);
+        let camera = Camera::from_vertical_fov(320, 20, 0.08);
+        let (tunnel, columns) = (Tunnel::Round(3.0), 4000);
+        let texel_m = TAU * 3.0 / columns as f64;
+        let raster = WallRaster::paint(
+            &Waves,
+            Illumination::Even,
+            None,
+            columns,
+            texel_m,
+            [-1.0, 1.0],
+        );
+        let none = Occluders::new(Vec::new(), Illumination::Even);
+        let cable = Solid::vertical_cable(x_m, z_m, radius_m);
+        let cables = Occluders::new(vec![cable], Illumination::Even);
+        for camera_x_m in [0.0, 0.25] {
+            let pose = Pose::new(Default::default(), Vector3::new(camera_x_m, 0.0, 0.0));
+            let render = |occluders: &Occluders| {
+                cast_rays(&raster, &tunnel, occluders, &camera, |_| pose, 8)
+            };
+            let (bare, hidden) = (render(&none), render(&cables));
+            let (aside_m, distance_m) = (x_m - camera_x_m, (x_m - camera_x_m).hypot(z_m));
+            let edges = [-1.0, 1.0].map(|side| {
+                let angle = (aside_m / z_m).atan() + side * (radius_m / distance_m).asin();
+                camera.fx * angle.tan() + camera.cx
+            });
+            for u in 0..320 {
+                let (at, differs) = (u as f64, hidden.at(u, 9) != bare.at(u, 9));
+                let covered = (at + 0.5).min(edges[1]) - (at - 0.5).max(edges[0]);
+                // An eighth of a pixel lies between sample points.
+                if covered <= -0.01 {
+                    assert!(!differs, "{u}");
+                } else if covered > 0.13 {
+                    assert!(differs, "{u}");
+                }
+            }
+        }
     }
 }

@@ -21,8 +21,8 @@ const STRIP_ROWS: usize = 128;
 impl Scene {
     /// Renders a frame without sensor noise, faults, rounding and saturation, in grey levels.
     ///
-    /// Wet patches and their reflections, moving objects, vignetting, the rig's shaft, gain and
-    /// bias are included.
+    /// Wet patches and their reflections, cables, lamps, moving objects, vignetting, the rig's
+    /// shaft, gain and bias are included.
     ///
     /// # Panics
     /// If there is no such frame.
@@ -51,7 +51,8 @@ impl Scene {
         Some(self.digitised_frame(&raster, source))
     }
 
-    /// Renders the unrolled wall under its illumination, without specular reflections.
+    /// Renders the unrolled wall under its illumination, without specular reflections,
+    /// cables and lamps.
     ///
     /// The result has `rows` rows of `columns` square pixels, once around from θ = 0; the first row
     /// begins at chainage `h_start_m` (metres). Each pixel is the mean of points spread over its
@@ -139,7 +140,8 @@ impl Scene {
             self.camera.upsampled(times),
             options.supersample.div_ceil(times),
         );
-        let wall = cast_rays(raster, &self.tunnel, &camera, pose, points);
+        let (tunnel, occluders) = (&self.tunnel, self.occluders(frame));
+        let wall = cast_rays(raster, tunnel, &occluders, &camera, pose, points);
         let occluded = draw_moving_objects(options.seed, frame, options.moving, wall);
         let lit = match options.lamp_corner {
             Some(corner) => {

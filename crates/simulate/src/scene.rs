@@ -3,6 +3,9 @@
 use crate::camera_path::CameraPath;
 use crate::error::SimulateError;
 use crate::exposure::GainBias;
+use crate::fittings::layout::FittingLayout;
+use crate::fittings::occlusion::Occluders;
+use crate::lining::segment_joints::JointedWall;
 use crate::options::SimulateOptions;
 use crate::procedural_noise::RandomStream;
 use crate::rig_shaft::RigShaft;
@@ -29,6 +32,7 @@ pub struct Scene {
     pub(super) tunnel: Tunnel,
     pub(super) texture: Box<dyn WallTexture>,
     pub(super) wet_patches: Option<WetPatches>,
+    fittings: FittingLayout,
     /// Number of texels around the section.
     pub(super) columns: usize,
 }
@@ -81,12 +85,17 @@ impl Scene {
                 ),
             });
         }
+        let texture = open_texture(
+            &options.wall,
+            RandomStream::WallTexture.seed(options.seed),
+            perimeter_m,
+        )?;
         Ok(Self {
-            texture: open_texture(
-                &options.wall,
-                RandomStream::WallTexture.seed(options.seed),
-                perimeter_m,
-            )?,
+            texture: match tunnel.lining().and_then(|lining| lining.segments.clone()) {
+                Some(rings) => Box::new(JointedWall::new(texture, rings)),
+                None => texture,
+            },
+            fittings: FittingLayout::new(&options.fittings, options.seed, &tunnel)?,
             wet_patches: (options.specular_percent > 0.0)
                 .then(|| WetPatches::new(options.seed, options.specular_percent, perimeter_m)),
             columns: (perimeter_m / texel_m).ceil() as usize,
@@ -123,6 +132,23 @@ impl Scene {
     pub fn frames(&self) -> impl Iterator<Item = usize> + '_ {
         let bad_frames = &self.options.bad_frames;
         (0..self.options.frames).filter(|frame| bad_frames.source_frame(*frame).is_some())
+    }
+
+    /// Minimum and maximum chainage of the wall that any frame sees, metres.
+    pub(super) fn seen_h_m(&self) -> [f64; 2] {
+        let hull = |a: [f64; 2], b: &[f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        self.visible_h_m.iter().fold(none, hull)
+    }
+
+    /// The cables and lamps that a frame may show.
+    pub(super) fn occluders(&self, frame: usize) -> Occluders {
+        let (camera_m, [from_m, to_m]) = (
+            self.tunnel.chainage_m(&self.truth()[frame].t_wc),
+            self.visible_h_m[frame],
+        );
+        let h_m = [from_m.min(camera_m), to_m.max(camera_m)];
+        Occluders::new(self.fittings.solids(&self.tunnel, h_m), self.options.light)
     }
 
     /// The shaft of the rig, if it is visible.

@@ -1,6 +1,7 @@
 //! Writes a simulated survey to a folder.
 
 use crate::error::SimulateError;
+use crate::lining::truth_file::format_deviation;
 use crate::options::SimulateOptions;
 use crate::scene::Scene;
 use image::{GrayImage, Luma};
@@ -28,7 +29,8 @@ pub struct SimulationRecord {
 /// Simulates a survey and writes its folder.
 ///
 /// The folder has `survey.toml`, `camera.json`, `frames/000000.png` …, `baseline.tum` (the plan),
-/// `groundtruth.tum` and `simulation.json`, and `mask.png` if the rig's shaft is visible.
+/// `groundtruth.tum` and `simulation.json`, `mask.png` if the rig's shaft is visible, and
+/// `groundtruth_shape.csv` if the lining deviates from the tunnel.
 ///
 /// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier
 /// simulated survey of that name is replaced. The same options give the same bytes, whatever the
@@ -70,11 +72,14 @@ const MASK_FILE: &str = "mask.png";
 /// Centreline of a curved tunnel.
 const CENTRELINE_FILE: &str = "centreline.txt";
 
+/// True deviation of a lining as built.
+const TRUE_SHAPE_FILE: &str = "groundtruth_shape.csv";
+
 /// Record of the simulation, by which a simulated survey is recognised.
 const RECORD_FILE: &str = "simulation.json";
 
 /// Files of a simulated survey.
-const FILES: [&str; 9] = [
+const FILES: [&str; 10] = [
     SURVEY_FILE,
     RECORD_FILE,
     // Written by the command line program.
@@ -84,6 +89,7 @@ const FILES: [&str; 9] = [
     "camera.json",
     "baseline.tum",
     "groundtruth.tum",
+    TRUE_SHAPE_FILE,
     "frames",
 ];
 
@@ -178,6 +184,10 @@ fn write_text_files(
     if let Some(centreline) = &options.tunnel.centreline {
         let copy = path(CENTRELINE_FILE);
         std::fs::copy(centreline, &copy).map_err(|source| WriteError::new(&copy, source))?;
+    }
+    if let Some(lining) = scene.tunnel.lining() {
+        let shape = format_deviation(lining, scene.seen_h_m());
+        atomic::write_text(&path(TRUE_SHAPE_FILE), &shape)?;
     }
     atomic::write_text(&survey_path, &survey)?;
     atomic::write_text(&record_path, &(record + "\n"))?;

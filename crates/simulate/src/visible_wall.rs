@@ -2,7 +2,8 @@
 
 use crate::camera_path::CameraPath;
 use crate::error::SimulateError;
-use crate::tunnel::{Tunnel, WallHit};
+use crate::tunnel::Tunnel;
+use crate::wall_intersection::{RayCaster, WallHit};
 use std::f64::consts::TAU;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::trajectory::Pose;
@@ -50,7 +51,7 @@ pub(super) fn visible_chainage(
     let border = camera.border(64, 0.5).into_iter();
     for (v, ray) in border.filter_map(|pixel| Some((pixel.y, camera.ray(pixel.x, pixel.y)?))) {
         let pose = path.pose_at_row(frame, v);
-        let WallHit { h_m, .. } = tunnel.caster_at(pose.t_wc).intersect(&(pose.r_wc * ray));
+        let WallHit { h_m, .. } = RayCaster::new(tunnel, pose.t_wc).intersect(&(pose.r_wc * ray));
         if h_m.is_nan() {
             return Err(too_far);
         }

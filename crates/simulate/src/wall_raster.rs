@@ -170,7 +170,7 @@ impl WallRaster {
 
 impl Illumination {
     /// Share of the light on the wall at angle θ (radians).
-    fn shade(self, theta: f64) -> f32 {
+    pub(super) fn shade(self, theta: f64) -> f32 {
         match self {
             Self::Even => 1.0,
             Self::Downward => (0.35 + 0.65 * 0.5 * (1.0 + theta.cos())) as f32,

@@ -10,9 +10,11 @@
 //! | [`rendering`] | canvas, interpolation and blending of panoramas |
 //! | [`panorama_files`] | files of a panorama and their formats |
 //! | [`textures`] | textures and layers of the viewer |
+//! | [`as_built`] | deviation of a simulated wall from its drawing, cables and lamps |
 //! | [`simulation`] | degradations of a simulated survey, its wall and its jitter |
 //! | [`resume`] | continuing an interrupted run |
 
+mod as_built;
 mod frame_times;
 mod motion;
 mod numbers;
@@ -24,6 +26,7 @@ mod simulation;
 mod textures;
 mod tunnel;
 
+pub use as_built::AsBuiltArguments;
 pub use frame_times::{FrameTimesArguments, clock_times};
 pub use motion::{MotionArguments, MountingArguments};
 pub use numbers::{memory_size, numbers, picture_size, positive, rate, share};

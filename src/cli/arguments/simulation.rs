@@ -1,6 +1,6 @@
 //! Arguments of simulated surveys: degradations, jitter and wall.
 
-use crate::simulate::{AsBuilt, BadFrames, BitDepth, SimulateOptions};
+use crate::simulate::{BadFrames, BitDepth, SimulateOptions};
 use crate::trajectory::JitterModel;
 use clap::ValueEnum;
 
@@ -20,16 +20,6 @@ pub struct DegradationArguments {
     /// [above 0, up to 1: no shading]. Combine with --light even to have no other light.
     #[arg(long, value_name = "SHARE")]
     lamp_corner: Option<f64>,
-    /// Oval lining: the radius varies by ± this around the section, twice once around, along all of
-    /// the tunnel, which the survey does not know. Straight round tunnels only.
-    #[arg(long, value_name = "MM", default_value_t = 0.0)]
-    ovality_mm: f64,
-    /// Undulating lining: the radius varies at random by this, root mean square.
-    #[arg(long, value_name = "MM", default_value_t = 0.0)]
-    undulation_mm: f64,
-    /// Length of the undulation: the distance at which its correlation has fallen to 0.6.
-    #[arg(long, value_name = "M", default_value_t = 0.5)]
-    undulation_length_m: f64,
     /// Damp patches of 5 to 30 cm on P percent of the wall: darker, with specular highlights of a
     /// lamp at the lens. The highlights move over the wall from frame to frame and may saturate
     /// [0 to 90].
@@ -69,11 +59,6 @@ impl DegradationArguments {
     /// Adds the degradations to the options of a simulation.
     pub fn add_to(&self, options: SimulateOptions) -> SimulateOptions {
         SimulateOptions {
-            as_built: AsBuilt {
-                ovality_mm: self.ovality_mm,
-                undulation_mm: self.undulation_mm,
-                undulation_length_m: self.undulation_length_m,
-            },
             gain_percent: self.gain_percent,
             bias_grey: self.bias_grey,
             lamp_corner: self.lamp_corner,

@@ -2,8 +2,8 @@
 
 use crate::camera::{Camera, Lens, read_calibration};
 use crate::cli::arguments::{
-    DegradationArguments, JitterArgument, TunnelArguments, WallArgument, numbers, picture_size,
-    positive,
+    AsBuiltArguments, DegradationArguments, JitterArgument, TunnelArguments, WallArgument, numbers,
+    picture_size, positive,
 };
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::simulate::{self, Illumination, SimulateOptions, Wall};
@@ -15,7 +15,8 @@ use std::path::PathBuf;
 /// Simulates a survey: frames of a tunnel wall, initial poses with errors, and the true poses.
 ///
 /// Writes a folder that all other commands accept: survey.toml, camera.json, frames, baseline.tum
-/// (the planned poses), groundtruth.tum, and simulation.json, which records the options.
+/// (the planned poses), groundtruth.tum, and simulation.json, which records the options. A lining
+/// that is not as drawn has groundtruth_shape.csv: its true deviation.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
@@ -27,6 +28,8 @@ use std::path::PathBuf;
     --specular-percent 3 --out damp\n  \
     tunnelstitch simulate free --shape horseshoe --width-m 5 --height-m 4 \
     --centreline bend.txt --out curved\n  \
+    tunnelstitch simulate free --segments 6 --ring-length-m 1.5 --step-mm 3 --cables 4 --lamps 2 \
+    --out built\n  \
     tunnelstitch simulate free --interval-s 0.333 --readout-ms 20 --out rolling\n  \
     tunnelstitch simulate free --turns 2 --moving 8 --bad-frames 5:black,18-20:missing --out bad"
 )]
@@ -130,6 +133,8 @@ pub struct SimulateArguments {
     #[arg(long, value_name = "N", default_value_t = 8)]
     supersample: u32,
     #[command(flatten)]
+    as_built: AsBuiltArguments,
+    #[command(flatten)]
     degradations: DegradationArguments,
     /// Seed of everything random (wall, jitter, noise, degradations): the same seed gives the same
     /// bytes.
@@ -188,7 +193,7 @@ impl SimulateArguments {
             (None, WallArgument::Target) => Wall::Target,
         };
         let camera = self.camera()?;
-        Ok(self.degradations.add_to(SimulateOptions {
+        let options = SimulateOptions {
             frames,
             advance_m: self.advance_m.unwrap_or(preset.advance_m),
             turn_deg: self.turn_deg,
@@ -206,7 +211,8 @@ impl SimulateArguments {
             supersample: self.supersample,
             seed: self.seed,
             ..preset
-        }))
+        };
+        Ok(self.degradations.add_to(self.as_built.add_to(options)))
     }
 
     /// The camera of --camera, or a pinhole camera with radial distortion.
@@ -272,6 +278,7 @@ pub fn run(
         &arguments.camera,
         &arguments.texture,
         &options.tunnel.centreline,
+        &options.as_built.shape_file,
     ];
     let inputs = record::hash_files(inputs.into_iter().flatten().map(AsRef::as_ref))?;
     record.write(&arguments.out.join(RUN_FILE), &inputs)?;

@@ -1,14 +1,13 @@
-//! A round lining as built: oval and undulating.
+//! Ovality and undulation of a lining.
 //!
-//! The radius at the angle θ and the chainage h is `r + a cos 2(θ − θ_0) + u(θ, h)`, with the
+//! The deviation at the angle θ and the chainage h is `a cos 2(θ − θ_0) + u(θ, h)`, with the
 //! undulation u a sum of [`WAVES`] cosines of random phase. Their wave numbers are drawn from the
 //! spectrum of a Gaussian correlation `exp(−x²/2ℓ²)`, of which u is a sample.
 //!
 //! Source: M. Shinozuka, C.-M. Jan, "Digital simulation of random processes and its applications",
 //! Journal of Sound and Vibration 25(1), 1972.
 
-use crate::options::AsBuilt;
-use nalgebra::Vector3;
+use crate::as_built::AsBuilt;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -17,11 +16,9 @@ use std::f64::consts::TAU;
 /// Number of cosines.
 const WAVES: usize = 240;
 
-/// A round lining that deviates from its radius.
+/// An oval with undulations.
 #[derive(Clone, Debug)]
-pub(super) struct Lining {
-    /// r, metres.
-    pub radius_m: f64,
+pub(super) struct Undulation {
     ovality_m: f64,
     ovality_at_rad: f64,
     /// Amplitude of each cosine, metres.
@@ -39,8 +36,8 @@ struct Wave {
     phase: f64,
 }
 
-impl Lining {
-    /// The lining of a tunnel of the given radius.
+impl Undulation {
+    /// Draws ovality and undulation for a tunnel of the given radius.
     pub fn new(radius_m: f64, as_built: &AsBuilt, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let length_m = as_built.undulation_length_m;
@@ -56,7 +53,6 @@ impl Lining {
             wave.phase = rng.random_range(0.0..TAU);
         }
         Self {
-            radius_m,
             ovality_m: 1e-3 * as_built.ovality_mm,
             ovality_at_rad: rng.random_range(0.0..TAU),
             amplitude_m: 1e-3 * as_built.undulation_mm * (2.0 / WAVES as f64).sqrt(),
@@ -74,12 +70,6 @@ impl Lining {
         let oval = self.ovality_m * (2.0 * (theta - self.ovality_at_rad)).cos();
         oval + self.amplitude_m * self.waves.iter().map(cosine).sum::<f64>()
     }
-
-    /// Relative distance of a point beyond the wall; negative inside.
-    pub fn beyond(&self, point: &Vector3<f64>) -> f64 {
-        let theta = point.x.atan2(point.z);
-        point.x.hypot(point.z) / (self.radius_m + self.deviation_m(theta, point.y)) - 1.0
-    }
 }
 
 #[cfg(test)]
@@ -95,12 +85,12 @@ mod tests {
         };
         let (mut square, mut product, mut count) = (0.0, 0.0, 0.0);
         for seed in 0..6 {
-            let lining = Lining::new(3.0, &as_built, seed);
+            let undulation = Undulation::new(3.0, &as_built, seed);
             for k in 0..4000 {
                 let (theta, h_m) = (0.37 * f64::from(k), 0.011 * f64::from(k));
-                let here = lining.deviation_m(theta, h_m);
+                let here = undulation.deviation_m(theta, h_m);
                 square += here * here;
-                product += here * lining.deviation_m(theta, h_m + 0.5);
+                product += here * undulation.deviation_m(theta, h_m + 0.5);
                 count += 1.0;
             }
         }
@@ -115,8 +105,8 @@ mod tests {
             ovality_mm: 10.0,
             ..AsBuilt::default()
         };
-        let lining = Lining::new(3.0, &as_built, 1);
-        let at = |theta: f64| lining.deviation_m(theta, 1.0);
+        let undulation = Undulation::new(3.0, &as_built, 1);
+        let at = |theta: f64| undulation.deviation_m(theta, 1.0);
         assert!((at(0.4) + at(0.4 + 0.25 * TAU)).abs() < 1e-12);
         assert!((at(0.4) - at(0.4 + TAU)).abs() < 1e-12);
         let largest = (0..360)
