@@ -23,7 +23,7 @@
 use super::error::SurveyError;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use tunnelstitch_geometry::surface::{Bend, RadialField, SplineLattice, Surface, WallPoint};
+use tunnelstitch_geometry::surface::{Bend, RadialField, SplineLattice, WallPoint};
 
 /// Name and version of the format.
 const FORMAT: &str = "wall-shape-1";
@@ -94,11 +94,11 @@ impl ShapeFile {
         }
     }
 
-    /// Reads a file for a tunnel as planned.
+    /// Reads a file for a tunnel of the given perimeter, metres.
     ///
     /// # Errors
     /// [`SurveyError::Value`] that names the file and what is wrong.
-    pub fn read(path: &Path, planned: &dyn Surface) -> Result<Self, SurveyError> {
+    pub fn read(path: &Path, perimeter_m: f64) -> Result<Self, SurveyError> {
         let value = |what: String| SurveyError::Value {
             path: path.to_owned(),
             what,
@@ -106,11 +106,7 @@ impl ShapeFile {
         let text = std::fs::read_to_string(path)
             .map_err(|error| value(format!("cannot read the wall's shape: {error}")))?;
         let file: Self = serde_json::from_str(&text).map_err(|error| value(error.to_string()))?;
-        file.check(planned.perimeter_m()).map_err(value)?;
-        if file.bend.is_some() && !planned.gauge().shift {
-            let what = "has a bend, which only a straight tunnel can have; remove it";
-            return Err(value(what.to_owned()));
-        }
+        file.check(perimeter_m).map_err(value)?;
         Ok(file)
     }
 
@@ -194,7 +190,7 @@ impl ShapeFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_geometry::surface::Circle;
+    use tunnelstitch_geometry::surface::{Circle, Surface};
 
     const BEND: Bend = Bend {
         curvature_per_m: [0.003, -0.001],
@@ -227,12 +223,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("shape.json");
         std::fs::write(&path, serde_json::to_string(&file()).unwrap()).unwrap();
-        let read = ShapeFile::read(&path, &circle()).unwrap();
+        let read = ShapeFile::read(&path, circle().perimeter_m()).unwrap();
         assert_eq!(read, file());
         assert_eq!(read.displacement(), Some(file().field()));
         let only = ShapeFile::of_bend(BEND, circle().perimeter_m());
         std::fs::write(&path, serde_json::to_string(&only).unwrap()).unwrap();
-        let read = ShapeFile::read(&path, &circle()).unwrap();
+        let read = ShapeFile::read(&path, circle().perimeter_m()).unwrap();
         assert_eq!((read.bend, read.displacement()), (Some(BEND), None));
     }
 

@@ -116,8 +116,15 @@ impl TunnelSection {
         folder: &Path,
     ) -> Result<Option<ShapeFile>, SurveyError> {
         let file = self.shape_file.as_ref();
-        file.map(|file| ShapeFile::read(&folder.join(file), planned))
-            .transpose()
+        let Some(path) = file.map(|file| folder.join(file)) else {
+            return Ok(None);
+        };
+        let found = ShapeFile::read(&path, planned.perimeter_m())?;
+        if found.bend.is_some() && !planned.gauge().shift {
+            let what = "has a bend, which only a straight tunnel can have; remove it".to_owned();
+            return Err(SurveyError::Value { path, what });
+        }
+        Ok(Some(found))
     }
 
     /// Creates the tunnel of the given shape, without `shape_file`; paths are relative to `folder`,

@@ -20,6 +20,9 @@
 //! dropped, the least useful first: a wall as planned ends without a shape, and its poses as if
 //! none had been looked for.
 //!
+//! A solve that ends for want of descent, as where the wall is not smooth, leaves a gradient that
+//! leads nowhere: then its end is taken for the minimum.
+//!
 //! Source: D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4(3), 1992 (the fixed
 //! point); M. F. Hutchinson, "A stochastic estimator of the trace of the influence matrix",
 //! Communications in Statistics 19(2), 1990.
@@ -59,21 +62,27 @@ pub struct LearnedShape<'s> {
 }
 
 /// Learns the strengths of the shape at a solution; None if no shape was estimated, or if the
-/// equations are singular. `alpha`: probability of finding a shape where there is none.
-pub fn learn_shape<'s>(solution: &'s Solution, alpha: f64) -> Option<LearnedShape<'s>> {
+/// equations are singular. `most_m`: largest strength, metres; `alpha`: probability of finding a
+/// shape where there is none.
+pub fn learn_shape<'s>(
+    solution: &'s Solution,
+    most_m: f64,
+    alpha: f64,
+) -> Option<LearnedShape<'s>> {
     let problem = &solution.problem;
     let equations = ShapeEquations {
         pattern: problem.pattern(),
         symbolic: problem.symbolic(),
         normal: &solution.linearisation.normal,
         border: solution.linearisation.border.as_ref(),
+        is_minimum: !solution.record.stop.is_converged(),
         shape: Shape {
             model: problem.shape()?.model.clone(),
             coefficients: solution.linearised_at.shape.clone(),
         },
         first_slot: solution.unknowns.frames.len(),
     };
-    equations.learn(alpha)
+    equations.learn(most_m, alpha)
 }
 
 /// The equations of all unknowns at a solution.
@@ -82,6 +91,8 @@ struct ShapeEquations<'s> {
     symbolic: &'s SymbolicFactorisation,
     normal: &'s NormalEquations,
     border: Option<&'s SharedBorder>,
+    /// True if the unknowns are taken for the minimum, whatever the gradient there.
+    is_minimum: bool,
     /// The shape there, with the strengths of the solve.
     shape: Shape,
     /// Slot of its first block.
@@ -115,13 +126,13 @@ impl<'s> ShapeEquations<'s> {
     }
 
     /// Learns the strengths, and drops scales of no use.
-    fn learn(self, alpha: f64) -> Option<LearnedShape<'s>> {
+    fn learn(self, most_m: f64, alpha: f64) -> Option<LearnedShape<'s>> {
         let scales = &self.shape.model.scales;
         let mut sigmas_m = self.sigmas_m();
         let mut dropped = vec![false; scales.len()];
         let threshold = 0.5 * normal_quantile(alpha, scales.len()).powi(2);
         loop {
-            let minimum = self.fixed_point(&mut sigmas_m, &dropped)?;
+            let minimum = self.fixed_point(&mut sigmas_m, most_m, &dropped)?;
             let gain = |k: usize| {
                 let mut without = sigmas_m.clone();
                 without[k] = NEGLIGIBLE * scales[k].sigma_m;
@@ -152,6 +163,11 @@ impl<'s> ShapeEquations<'s> {
     /// The minimum for the strengths `sigmas_m`; None if the equations are singular.
     fn minimum(&self, sigmas_m: &[f64]) -> Option<Minimum<'s>> {
         let mut normal = self.normal.clone();
+        let mut shared_gradient = self.border.map_or(Kappa::zeros(), |border| border.gradient);
+        if self.is_minimum {
+            normal.gradient.fill(FrameStep::zeros());
+            shared_gradient.fill(0.0);
+        }
         let (mut prior_cost, mut log_volume) = (0.0, 0.0);
         let scales = self.shape.model.scales.iter().zip(sigmas_m);
         for ((scale, sigma_m), slots) in scales.zip(self.slots()) {
@@ -166,33 +182,37 @@ impl<'s> ShapeEquations<'s> {
             }
         }
         let factor = self.symbolic.factorise(self.pattern, &normal, 0.0).ok()?;
-        let eliminated = self
-            .border
-            .map(|border| (border, border.eliminate(&factor, 0.0)));
+        let eliminated = self.border.map(|border| border.eliminate(&factor, 0.0));
         let mut log_determinant = factor.log_determinant();
         let (step, shared) = match &eliminated {
-            Some((border, schur)) => schur.step(&factor, &normal.gradient, &border.gradient)?,
+            Some(schur) => schur.step(&factor, &normal.gradient, &shared_gradient)?,
             None => (factor.step(&normal.gradient), Kappa::zeros()),
         };
         let slopes = step.iter().zip(&normal.gradient);
         let mut slope: f64 = slopes.map(|(step, gradient)| step.dot(gradient)).sum();
-        if let Some((border, schur)) = &eliminated {
-            slope += shared.dot(&border.gradient);
+        if let Some(schur) = &eliminated {
+            slope += shared.dot(&shared_gradient);
             let l = schur.schur.cholesky()?.l();
             log_determinant += 2.0 * l.diagonal().iter().map(|d| d.ln()).sum::<f64>();
         }
         Some(Minimum {
             factor,
-            schur: eliminated.map(|(_, schur)| schur),
+            schur: eliminated,
             step,
             shared,
             log_evidence: -(prior_cost + 0.5 * slope) - 0.5 * log_determinant - log_volume,
         })
     }
 
-    /// Goes to the strengths of the largest evidence, but for those of `dropped` scales, and
+    /// Goes to the strengths of the largest evidence up to `most_m`, but for those of `dropped`
+    /// scales, and
     /// returns the minimum there.
-    fn fixed_point(&self, sigmas_m: &mut [f64], dropped: &[bool]) -> Option<Minimum<'s>> {
+    fn fixed_point(
+        &self,
+        sigmas_m: &mut [f64],
+        most_m: f64,
+        dropped: &[bool],
+    ) -> Option<Minimum<'s>> {
         let mut minimum = self.minimum(sigmas_m)?;
         for _ in 0..MAX_STEPS {
             let mut largest_change = 0.0f64;
@@ -209,7 +229,8 @@ impl<'s> ShapeEquations<'s> {
                     })
                     .sum();
                 let learned = (square / determined.max(f64::MIN_POSITIVE)).sqrt();
-                let factor = (learned / sigmas_m[k]).clamp(1.0 / MAX_STEP_FACTOR, MAX_STEP_FACTOR);
+                let factor = (learned.min(most_m) / sigmas_m[k])
+                    .clamp(1.0 / MAX_STEP_FACTOR, MAX_STEP_FACTOR);
                 sigmas_m[k] *= factor;
                 largest_change = largest_change.max(factor.ln().abs());
             }
@@ -321,10 +342,11 @@ mod tests {
             symbolic: &symbolic,
             normal: &normal,
             border: None,
+            is_minimum: false,
             shape: Shape::nominal(model),
             first_slot: 1,
         };
-        let learned = equations.learn(1e-3).unwrap();
+        let learned = equations.learn(0.03, 1e-3).unwrap();
         let learned = learned.shape_after(&learned.minimum.step);
         let scales = &learned.model.scales;
         assert_eq!(scales.len(), 1, "{scales:?}");

@@ -51,6 +51,11 @@ pub enum StopReason {
 }
 
 impl StopReason {
+    /// True if the last step was short.
+    pub fn is_converged(self) -> bool {
+        matches!(self, Self::StepBelowTolerance | Self::StepBelowUncertainty)
+    }
+
     /// The reason in words; `last_step_px`: the movement of the wall in the last step.
     pub fn explain(self, stopping: &Stopping, last_step_px: f64) -> String {
         match self {

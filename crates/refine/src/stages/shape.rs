@@ -27,6 +27,9 @@ const MAX_COLUMNS: usize = 64;
 /// Coefficient beyond which a shape is not believed, 1-σ of the prior: a thirtieth of the radius,
 /// if the survey does not say how exact the wall is.
 const MAX_PRIOR_SIGMAS: f64 = 10.0;
+/// Largest strength of a scale, 1-σ of the prior. The residuals of a wall that is not smooth would
+/// be explained by shapes that pixels hardly see.
+const MAX_STRENGTH_SIGMAS: f64 = 3.0;
 /// Strength of a finer lattice over that of the one before, before it is learned.
 const FINER_STRENGTH: f64 = 0.5;
 /// Factor by which a strength may change without a new solve; the estimate hardly depends on it.
@@ -98,7 +101,8 @@ fn fix_shared(setup: &Setup, state: &mut PipelineState) {
 /// given one, and the tunnel from a straight one. Returns true if that changes anything; the state
 /// is then where the new solve should end.
 pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution) -> bool {
-    let Some(learned) = learn_shape(solution, setup.options.false_alarm_rate) else {
+    let most_m = MAX_STRENGTH_SIGMAS * setup.shape_sigma_m;
+    let Some(learned) = learn_shape(solution, most_m, setup.options.false_alarm_rate) else {
         return false;
     };
     let kappa = solution.linearised_at.kappa;

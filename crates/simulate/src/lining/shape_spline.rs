@@ -28,7 +28,16 @@ impl ShapeSpline {
     /// # Errors
     /// [`SurveyError`] that names the file and what is wrong.
     pub fn read(path: &Path, perimeter_m: f64) -> Result<Self, SurveyError> {
-        let field = ShapeFile::read(path, perimeter_m)?.field();
+        let file = ShapeFile::read(path, perimeter_m)?;
+        if file.bend.is_some() {
+            return Err(SurveyError::Value {
+                path: path.to_owned(),
+                what: "has a bend, which is not drawn; remove it, or draw a curved tunnel \
+                       (--centreline)"
+                    .to_owned(),
+            });
+        }
+        let field = file.field();
         let lattice = field.lattice();
         Ok(Self {
             spacing_m: lattice.perimeter_m / lattice.columns as f64,
