@@ -130,6 +130,7 @@ fn shape_files(
         field: &shape.field,
         error_draws: &shape.error_draws,
         prior_sigma_m: shape.prior_sigma_m,
+        extent_h_m: shape.extent_h_m,
     };
     let deviation_sigmas_m = deviation_sigmas_m(&estimate);
     let sections = measure_sections(&estimate, &deviation_sigmas_m);

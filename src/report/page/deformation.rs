@@ -30,7 +30,8 @@ pub fn section(data: &PageData) -> Result<Option<Markup>, ReportError> {
 
 fn draw(deformation: &Deformation, perimeter_m: f64) -> Result<Markup, ReportError> {
     let sections = &deformation.sections;
-    let is_round = sections.iter().any(|section| section.radius_m.is_some());
+    let is_round =
+        (sections.iter()).any(|section| section.ovality_mm.or(section.radius_m).is_some());
     let reference = if is_round || sections.is_empty() {
         "the best-fit circle of its section"
     } else {
@@ -59,7 +60,7 @@ fn draw(deformation: &Deformation, perimeter_m: f64) -> Result<Markup, ReportErr
                  it. Convergence is a negative change of a chord. All sections are in "
                 code { "sections.csv" } "."
             }
-            (charts(sections, is_round))
+            (charts(sections))
         }
     })
 }
@@ -165,56 +166,65 @@ const CHORDS: [Curve; 4] = [
     }),
 ];
 
+/// A chart of curves over the sections; empty if none has a value.
+fn chart(
+    sections: &[SectionDeformation],
+    title: &str,
+    vertical: Vertical,
+    curves: &[Curve],
+) -> Markup {
+    let series = curves.iter().enumerate().map(|(k, (name, figure))| {
+        let style = match curves {
+            [_] => CurveStyle::Refined,
+            _ => CurveStyle::Ordered(k),
+        };
+        curve(sections, name, style, *figure)
+    });
+    let series: Vec<Series> = series.collect();
+    if series.iter().all(|curve| curve.points.is_empty()) {
+        return Markup::default();
+    }
+    Chart {
+        title: title.to_owned(),
+        unit: "mm".to_owned(),
+        along: axis(sections),
+        vertical,
+        series,
+        marks: Vec::new(),
+    }
+    .draw()
+}
+
+const CENTRE: [Curve; 2] = [
+    ("centre towards 3 o\u{2019}clock", |s| {
+        [s.centre_x_mm, s.centre_x_sigma_mm]
+    }),
+    ("towards 12", |s| [s.centre_z_mm, s.centre_z_sigma_mm]),
+];
+
 /// Charts along the chainage.
-fn charts(sections: &[SectionDeformation], is_round: bool) -> Markup {
-    let chart = |title: &str, vertical, curves: &[Curve]| {
-        let series = curves.iter().enumerate().map(|(k, (name, figure))| {
-            let style = match curves {
-                [_] => CurveStyle::Refined,
-                _ => CurveStyle::Ordered(k),
-            };
-            curve(sections, name, style, *figure)
-        });
-        Chart {
-            title: title.to_owned(),
-            unit: "mm".to_owned(),
-            along: axis(sections),
-            vertical,
-            series: series.collect(),
-            marks: Vec::new(),
-        }
-        .draw()
+fn charts(sections: &[SectionDeformation]) -> Markup {
+    let entries = |curves: &[Curve]| -> Vec<(&str, CurveStyle)> {
+        let names = curves.iter().map(|(name, _)| *name);
+        names.zip((0..).map(CurveStyle::Ordered)).collect()
     };
-    let of_chords: Vec<(&str, CurveStyle)> = (CHORDS.iter().enumerate())
-        .map(|(k, (name, _))| (*name, CurveStyle::Ordered(k)))
-        .collect();
-    let of_centre = [
-        ("centre towards 3 o\u{2019}clock", CurveStyle::Ordered(0)),
-        ("towards 12", CurveStyle::Ordered(1)),
-    ];
+    let has_centre = sections.iter().any(|section| section.centre_x_mm.is_some());
     html! {
-        @if is_round {
-            (legend(&of_centre, &[ChartElement::Band]))
-            div.charts {
-                (chart("Radius of the best-fit circle, minus nominal", Vertical::Linear, &[
-                    ("radius", |s| [s.radius_change_mm, s.radius_sigma_mm]),
-                ]))
-                (chart("Centre of the best-fit circle", Vertical::Linear, &[
-                    ("to 3", |s| [s.centre_x_mm, s.centre_x_sigma_mm]),
-                    ("to 12", |s| [s.centre_z_mm, s.centre_z_sigma_mm]),
-                ]))
-                (chart("Ovality: largest minus smallest diameter", Vertical::FromZero, &[
-                    ("ovality", |s| [s.ovality_mm, s.ovality_sigma_mm]),
-                ]))
-            }
-        }
-        (legend(&of_chords, &[ChartElement::Band]))
+        @if has_centre { (legend(&entries(&CENTRE), &[ChartElement::Band])) }
         div.charts {
-            (chart("Chords, minus nominal", Vertical::Linear, &CHORDS))
-            (chart("Deviation, root mean square", Vertical::FromZero, &[
+            (chart(sections, "Radius of the best-fit circle, minus nominal", Vertical::Linear, &[
+                ("radius", |s| [s.radius_change_mm, s.radius_sigma_mm]),
+            ]))
+            (chart(sections, "Centre of the best-fit circle", Vertical::Linear, &CENTRE))
+            (chart(sections, "Ovality: largest minus smallest diameter", Vertical::FromZero, &[
+                ("ovality", |s| [s.ovality_mm, s.ovality_sigma_mm]),
+            ]))
+            (chart(sections, "Deviation, root mean square", Vertical::FromZero, &[
                 ("deviation", |s| [s.deviation_rms_mm, None]),
             ]))
         }
+        (legend(&entries(&CHORDS), &[ChartElement::Band]))
+        div.charts { (chart(sections, "Chords, minus nominal", Vertical::Linear, &CHORDS)) }
     }
 }
 

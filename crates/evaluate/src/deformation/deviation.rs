@@ -17,7 +17,7 @@ pub const MAX_SIGMA_SHARE: f64 = 0.5;
 
 /// 1-σ of the deviation from the best-fit circle at each node of the field (of δ itself where the
 /// section is no circle), row by row, metres; None where the frames do not determine it, see
-/// [`MAX_SIGMA_SHARE`]. Empty if no errors are known.
+/// [`MAX_SIGMA_SHARE`], or do not see the row. Empty if no errors are known.
 ///
 /// The circle is fitted to all nodes of the row.
 pub fn deviation_sigmas_m(shape: &ShapeEstimate) -> Vec<Option<f64>> {
@@ -30,6 +30,9 @@ pub fn deviation_sigmas_m(shape: &ShapeEstimate) -> Vec<Option<f64>> {
         let walls = nodes(shape.field, *row);
         let samples = SectionSamples::new(shape.field, shape.error_draws, &walls);
         let h_m = walls.first().map_or(0.0, |wall| wall.h_m);
+        if !shape.sees(h_m) {
+            return vec![None; walls.len()];
+        }
         let fit = is_circle(shape.nominal, h_m)
             .then(|| CircleFit::new(&angles_rad(&walls, shape.field), &vec![true; walls.len()]))
             .flatten();
@@ -78,7 +81,7 @@ fn angles_rad(walls: &[WallPoint], field: &RadialField) -> Vec<f64> {
 /// Map of the deviation of a wall from the best-fit circles of its sections; from the nominal wall
 /// where these are no circles.
 ///
-/// Without known σ all nodes count as determined.
+/// Without known σ all nodes but those of the first and the last row count as determined.
 #[derive(Clone, Debug)]
 pub struct DeviationMap {
     field: RadialField,
@@ -153,7 +156,9 @@ impl DeviationMap {
             return None;
         }
         if self.sigmas_m.is_empty() {
-            return Some(f64::NAN);
+            // Beyond the first and the last row the spline goes to zero.
+            let is_inner = (1..self.circles.len() - 1).contains(&row);
+            return is_inner.then_some(f64::NAN);
         }
         let columns = self.field.lattice().columns;
         *self.sigmas_m.get(row * columns + column % columns)?

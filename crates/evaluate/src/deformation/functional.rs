@@ -16,8 +16,7 @@ pub(super) struct Functional {
 pub(super) struct Measured {
     /// The value, in the unit of the function.
     pub(super) value: f64,
-    /// 1-σ of the value; None if it is unknown, or if the shape's functions cannot express a change
-    /// of it.
+    /// 1-σ of the value; None if it is unknown.
     pub(super) sigma: Option<f64>,
 }
 
@@ -67,6 +66,13 @@ impl SectionSamples {
             delta_m: at(field),
             draws_m: draws.iter().map(at).collect(),
         }
+    }
+
+    /// Value and 1-σ of a function; None if errors are known and the shape's functions do not express
+    /// a change of it, so that its value is none that was measured.
+    pub(super) fn measure_expressed(&self, function: &Functional) -> Option<Measured> {
+        let measured = self.measure(function);
+        (self.draws_m.is_empty() || measured.sigma.is_some()).then_some(measured)
     }
 
     /// Value and 1-σ of a function.

@@ -99,6 +99,15 @@ pub fn clock_position(angle_deg: f64) -> String {
     format!("{hour}:{:02}", minutes % 60)
 }
 
+/// A number with some decimals; zero has no sign.
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|digit| matches!(digit, '0' | '.')) => rest.to_owned(),
+        _ => text,
+    }
+}
+
 /// The text of `sections.csv`.
 pub fn sections_csv(sections: &[SectionDeformation]) -> String {
     let mut text = COLUMNS.map(|(name, _)| name).join(",");
@@ -106,9 +115,7 @@ pub fn sections_csv(sections: &[SectionDeformation]) -> String {
     for section in sections {
         let mut section = section.clone();
         let cells = COLUMNS.map(|(_, column)| match column {
-            Number(decimals, field) => {
-                field(&mut section).map(|value| format!("{value:.decimals$}"))
-            }
+            Number(decimals, field) => field(&mut section).map(|value| fixed(value, decimals)),
             Clock(field) => field(&mut section).map(clock_position),
         });
         text += &cells.map(Option::unwrap_or_default).join(",");
@@ -163,6 +170,7 @@ mod tests {
     fn a_table_is_read_back_and_empty_cells_stay_empty() {
         let section = SectionDeformation {
             chainage_m: Some(1.25),
+            centre_x_mm: Some(0.0),
             radius_m: Some(3.004),
             max_diameter_deg: Some(45.0),
             ovality_mm: Some(20.5),

@@ -22,6 +22,8 @@ pub struct EstimatedShape {
     /// 1-σ of the displacement by its prior, before the frames were seen, metres: root mean square
     /// around the tunnel; 0 if nothing was estimated.
     pub prior_sigma_m: f64,
+    /// Chainage between which the frames see the wall, metres; None if nothing was estimated.
+    pub extent_h_m: Option<[f64; 2]>,
 }
 
 /// The shape in the report.
@@ -79,6 +81,7 @@ impl EstimatedShape {
                     error_draws(shape, covariance, first_slot)
                 }),
             prior_sigma_m: model.map_or(0.0, |model| prior_sigma_m(model, &field)),
+            extent_h_m: model.map(ShapeModel::extent_h_m),
             field,
         })
     }
@@ -91,6 +94,9 @@ impl EstimatedShape {
             sigma_m: self.sigma_m.iter().map(|sigma_m| sigma_m * scale).collect(),
             error_draws: self.error_draws.into_iter().map(moved).collect(),
             prior_sigma_m: self.prior_sigma_m * scale,
+            extent_h_m: self
+                .extent_h_m
+                .map(|h_m| h_m.map(|h_m| (h_m + by.h_m) * scale)),
         }
     }
 }
