@@ -108,7 +108,7 @@ fn plots(deformation: &Deformation) -> Markup {
         h3 { "Sections" }
         p {
             "Seen towards increasing chainage. Deviations are drawn " (exaggeration.words())
-            " from the dashed reference; the bar is " (short(exaggeration.bar_mm())) " mm."
+            " from the dashed reference; the bar is " (exaggeration.bar_mm()) " mm."
         }
         div.sections {
             @for profile in &deformation.profiles {
@@ -139,7 +139,7 @@ fn words(section: &SectionDeformation) -> Markup {
             @if let Some(angle_deg) = section.max_diameter_deg {
                 br; "widest at " (clock_position(angle_deg))
                 @if let Some(sigma_deg) = section.max_diameter_sigma_deg {
-                    " ± " (fixed(2.0 * sigma_deg, 0)) " min"
+                    " ± " (fixed(sigma_deg, 1)) "°"
                 }
             }
         }
@@ -216,7 +216,7 @@ fn charts(sections: &[SectionDeformation]) -> Markup {
                 ("radius", |s| [s.radius_change_mm, s.radius_sigma_mm]),
             ]))
             (chart(sections, "Centre of the best-fit circle", Vertical::Linear, &CENTRE))
-            (chart(sections, "Ovality: largest minus smallest diameter", Vertical::FromZero, &[
+            (chart(sections, "Ovality: D max − D min", Vertical::FromZero, &[
                 ("ovality", |s| [s.ovality_mm, s.ovality_sigma_mm]),
             ]))
             (chart(sections, "Deviation, root mean square", Vertical::FromZero, &[

@@ -39,7 +39,7 @@ impl Exaggeration {
 
     /// The factor in words.
     pub(super) fn words(&self) -> String {
-        format!("{} times exaggerated", short(self.factor))
+        format!("{} times exaggerated", self.factor)
     }
 
     /// Deviation that the bar shows, millimetres.
@@ -106,13 +106,13 @@ pub(super) fn section_plot(profile: &SectionProfile, exaggeration: &Exaggeration
                 text.tick x=(format!("{x:.1}")) y=(format!("{y:.1}")) dy="0.35em"
                     text-anchor="middle" { (hour) }
             }
-            line.base x1=(format!("{left:.1}")) x2=(format!("{right:.1}")) y1=(middle) y2=(middle) {}
-            line.base x1=(format!("{left:.1}")) x2=(format!("{left:.1}"))
+            line.bar x1=(format!("{left:.1}")) x2=(format!("{right:.1}")) y1=(middle) y2=(middle) {}
+            line.bar x1=(format!("{left:.1}")) x2=(format!("{left:.1}"))
                 y1=(middle - 3.0) y2=(middle + 3.0) {}
-            line.base x1=(format!("{right:.1}")) x2=(format!("{right:.1}"))
+            line.bar x1=(format!("{right:.1}")) x2=(format!("{right:.1}"))
                 y1=(middle - 3.0) y2=(middle + 3.0) {}
             text.tick x=(middle) y=(middle + 16.0) text-anchor="middle" {
-                (short(exaggeration.bar_mm)) " mm"
+                (exaggeration.bar_mm) " mm"
             }
         }
     }
