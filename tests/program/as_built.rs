@@ -112,7 +112,8 @@ fn sections() -> Vec<SectionDeformation> {
 }
 
 /// Figures of every section against those of the simulated lining, in units of the stated σ. The
-/// angle of the result is that of the initial poses, so only what does not depend on it is compared.
+/// angle of the result is that of the initial poses, so only what does not depend on it is
+/// compared.
 #[test]
 fn sections_are_those_of_the_lining_within_their_sigma() {
     let (lining, sections) = (lining(), sections());

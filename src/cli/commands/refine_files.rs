@@ -39,7 +39,8 @@ struct RefineFile<'a> {
 }
 
 /// Refines a survey, continuing from a checkpoint if there is one, and writes poses.tum,
-/// refine.json and covariance.csv into `out`, shape.json and sections.csv if the wall is deformed. Also returns the text of refine.json.
+/// refine.json and covariance.csv into `out`, shape.json and sections.csv if the wall is deformed.
+/// Also returns the text of refine.json.
 ///
 /// # Errors
 /// Bad input, or an output that cannot be written.

@@ -42,8 +42,8 @@ fn draw(deformation: &Deformation, perimeter_m: f64) -> Result<Markup, ReportErr
     Ok(html! {
         p {
             "Deviation of the wall from " (reference)
-            ", estimated with the poses; outwards is positive. The unrolled wall is seen from inside, "
-            "chainage to the right, clock position upwards; it is " (short(perimeter_m))
+            ", estimated with the poses; outwards is positive. The unrolled wall is seen from \
+             inside, chainage to the right, clock position upwards; it is " (short(perimeter_m))
             " m around. Blank: the frames do not determine it."
         }
         (strip("Deviation", &deformation.map, &deformation.map.deviation_mm, &deviation)?)
@@ -56,8 +56,8 @@ fn draw(deformation: &Deformation, perimeter_m: f64) -> Result<Markup, ReportErr
         @if sections.len() > 1 {
             h3 { "Along the tunnel" }
             p {
-                "Lengths are relative to the nominal section, which sets the scale: no picture shows \
-                 it. Convergence is a negative change of a chord. All sections are in "
+                "Lengths are relative to the nominal section, which sets the scale: no picture \
+                 shows it. Convergence is a negative change of a chord. All sections are in "
                 code { "sections.csv" } "."
             }
             (charts(sections))

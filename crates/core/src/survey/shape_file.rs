@@ -45,8 +45,8 @@ pub struct ShapeFile {
     /// 1-σ of δ at each node, metres; empty if unknown.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sigma_m: Vec<f64>,
-    /// 1-σ of the deviation from the best-fit circle of its row at each node, metres; None where the
-    /// frames do not determine it. Empty if unknown.
+    /// 1-σ of the deviation from the best-fit circle of its row at each node, metres; None where
+    /// the frames do not determine it. Empty if unknown.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub deviation_sigma_m: Vec<Option<f64>>,
 }

@@ -1,9 +1,9 @@
 //! Best-fit circle of a section.
 //!
 //! A circle of the radius `r + a` about the point (x, z) has, to first order, the displacement
-//! `a + x sin θ + z cos θ` from the nominal one, θ from z (twelve o'clock) towards x (three o'clock).
-//! So with rows `A_k = (1, sin θ_k, cos θ_k)` the least-squares fit to displacements δ_k is
-//! `(a, x, z) = (AᵀA)⁻¹ Aᵀ δ`: a linear function of δ.
+//! `a + x sin θ + z cos θ` from the nominal one, θ from z (twelve o'clock) towards x (three
+//! o'clock). So with rows `A_k = (1, sin θ_k, cos θ_k)` the least-squares fit to displacements δ_k
+//! is `(a, x, z) = (AᵀA)⁻¹ Aᵀ δ`: a linear function of δ.
 
 use super::functional::Functional;
 use nalgebra::{Matrix3, Vector3};

@@ -1,8 +1,8 @@
 //! Convergence chords: distances between points of the wall on standard lines.
 //!
 //! The end points a, b of a chord move along their normals, so that its length is, to first order,
-//! `ℓ + u·n_b δ_b − u·n_a δ_a` with the nominal length ℓ and the unit vector u from a to b. A length
-//! that falls (convergence) is a negative change.
+//! `ℓ + u·n_b δ_b − u·n_a δ_a` with the nominal length ℓ and the unit vector u from a to b. A
+//! length that falls (convergence) is a negative change.
 
 use super::functional::Functional;
 use super::outline::{DEGREES, SectionOutline};

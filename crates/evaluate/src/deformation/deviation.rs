@@ -11,8 +11,8 @@ use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{RadialField, Surface, WallPoint};
 
 /// Largest 1-σ of a deviation that is determined, in units of that before any frame was seen.
-/// Higher: more of the wall is shown, with larger errors. Chosen by: frames that halve it tell three
-/// times as much as was known before.
+/// Higher: more of the wall is shown, with larger errors. Chosen by: frames that halve it tell
+/// three times as much as was known before.
 pub const MAX_SIGMA_SHARE: f64 = 0.5;
 
 /// 1-σ of the deviation from the best-fit circle at each node of the field (of δ itself where the
@@ -87,7 +87,8 @@ pub struct DeviationMap {
     field: RadialField,
     /// 1-σ at the nodes, metres; empty if unknown.
     sigmas_m: Vec<Option<f64>>,
-    /// Displacement `(a, x, z)` of the best-fit circle of each row; None where it is not determined.
+    /// Displacement `(a, x, z)` of the best-fit circle of each row; None where it is not
+    /// determined.
     circles: Vec<Option<Vector3<f64>>>,
 }
 
@@ -116,8 +117,8 @@ impl DeviationMap {
         }))
     }
 
-    /// The map of a field over the nominal wall, with 1-σ at its nodes as [`deviation_sigmas_m`] has
-    /// them.
+    /// The map of a field over the nominal wall, with 1-σ at its nodes as [`deviation_sigmas_m`]
+    /// has them.
     pub fn new(nominal: &dyn Surface, field: RadialField, sigmas_m: Vec<Option<f64>>) -> Self {
         let columns = field.lattice().columns;
         let rows: Vec<(usize, i64)> = field.rows().enumerate().collect();

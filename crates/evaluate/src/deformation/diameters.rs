@@ -1,13 +1,13 @@
 //! Largest and smallest diameter of a section, their directions, and its second harmonic.
 //!
-//! The diameter at the angle θ is `D(θ) = 2r + δ(θ) + δ(θ + π)`, free of the position of the centre.
-//! Its extremes are taken over whole degrees. To first order the error of an extreme is that of the
-//! diameter at its direction, and its direction errs by `σ(D')/|D''|`. An extreme of values that err
-//! is extreme by chance as well: of a round section, the largest diameter is too large, and the
-//! smallest too small, by about one σ.
+//! The diameter at the angle θ is `D(θ) = 2r + δ(θ) + δ(θ + π)`, free of the position of the
+//! centre. Its extremes are taken over whole degrees. To first order the error of an extreme is
+//! that of the diameter at its direction, and its direction errs by `σ(D')/|D''|`. An extreme of
+//! values that err is extreme by chance as well: of a round section, the largest diameter is too
+//! large, and the smallest too small, by about one σ.
 //!
-//! The second harmonic is `c cos 2(θ − θ_2)` of the displacement, with `c cos 2θ_2`, `c sin 2θ_2` the
-//! means of `2 δ cos 2θ`, `2 δ sin 2θ`; an ellipse has diameters `2(r ± c)`.
+//! The second harmonic is `c cos 2(θ − θ_2)` of the displacement, with `c cos 2θ_2`, `c sin 2θ_2`
+//! the means of `2 δ cos 2θ`, `2 δ sin 2θ`; an ellipse has diameters `2(r ± c)`.
 
 use super::functional::{Functional, Measured, SectionSamples};
 use super::outline::{DEGREES, SectionOutline};

@@ -68,8 +68,8 @@ impl SectionSamples {
         }
     }
 
-    /// Value and 1-σ of a function; None if errors are known and the shape's functions do not express
-    /// a change of it, so that its value is none that was measured.
+    /// Value and 1-σ of a function; None if errors are known and the shape's functions do not
+    /// express a change of it, so that its value is none that was measured.
     pub(super) fn measure_expressed(&self, function: &Functional) -> Option<Measured> {
         let measured = self.measure(function);
         (self.draws_m.is_empty() || measured.sigma.is_some()).then_some(measured)

@@ -10,8 +10,8 @@ const AROUND: usize = 180;
 /// Largest number of cells of the grid along the axis.
 const MAX_ALONG: usize = 2000;
 
-/// Deviation over the wall. Lists are row-major: a row for each cell along the axis, which begins at
-/// θ = 0.
+/// Deviation over the wall. Lists are row-major: a row for each cell along the axis, which begins
+/// at θ = 0.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct DeviationGrid {

@@ -3,8 +3,8 @@
 //! # Model
 //!
 //! The wall's displacement `δ(s, h)` along the outward normal of the nominal section is known with
-//! its errors: draws `ε_d(s, h)` of them, d = 1 … D. At a chainage, every figure is a linear function
-//! of the displacements at points k of the section,
+//! its errors: draws `ε_d(s, h)` of them, d = 1 … D. At a chainage, every figure is a linear
+//! function of the displacements at points k of the section,
 //!
 //! `L = L_0 + Σ_k w_k δ_k`,  `σ²(L) = 1/D Σ_d (Σ_k w_k ε_d,k)²`.
 //!
@@ -24,16 +24,16 @@
 //!
 //! # Precision of the linear functions
 //!
-//! A circle displaced by e about its nominal centre has `δ = e cos θ − e²/(2r) sin²θ + …`, so radius
-//! and centre err by less than `e²/(2r)`: 0.02 mm for 10 mm at a radius of 3 m.
+//! A circle displaced by e about its nominal centre has `δ = e cos θ − e²/(2r) sin²θ + …`, so
+//! radius and centre err by less than `e²/(2r)`: 0.02 mm for 10 mm at a radius of 3 m.
 //!
 //! # What is determined
 //!
 //! A point of the wall counts as determined where the frames have at least halved the σ that the
-//! deviation had before them ([`MAX_SIGMA_SHARE`]). Everything else is left out: of fits, of extremes, of
-//! maps. Radius and centre are relative to the nominal ones: no picture shows the scale of a tunnel,
-//! so the mean of δ is as certain as the initial poses' steps make it, and its σ does not contain the
-//! error of the nominal radius.
+//! deviation had before them ([`MAX_SIGMA_SHARE`]). Everything else is left out: of fits, of
+//! extremes, of maps. Radius and centre are relative to the nominal ones: no picture shows the
+//! scale of a tunnel, so the mean of δ is as certain as the initial poses' steps make it, and its σ
+//! does not contain the error of the nominal radius.
 //!
 //! A section that is no circle has no best-fit circle and no ovality; its deviation is δ itself.
 

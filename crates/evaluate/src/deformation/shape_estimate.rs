@@ -23,7 +23,8 @@ impl ShapeEstimate<'_> {
         self.field.lattice().columns
     }
 
-    /// True for a row of nodes, at a chainage in metres, that is seen, or not half a spacing beyond.
+    /// True for a row of nodes, at a chainage in metres, that is seen, or not half a spacing
+    /// beyond.
     pub(super) fn sees(&self, h_m: f64) -> bool {
         let beyond_m = 0.5 * self.field.lattice().spacing_m();
         let [from_m, to_m] = self

@@ -16,8 +16,8 @@ pub struct EstimatedShape {
     /// NaN where it is unknown.
     pub sigma_m: Vec<f64>,
     /// Draws of the displacement's errors, by pixels, prior, lens and model errors, with all their
-    /// correlations; none if they are unknown. With 128 of them a 1-σ of any figure that is computed
-    /// from the field is known to 6 %.
+    /// correlations; none if they are unknown. With 128 of them a 1-σ of any figure that is
+    /// computed from the field is known to 6 %.
     pub error_draws: Vec<RadialField>,
     /// 1-σ of the displacement by its prior, before the frames were seen, metres: root mean square
     /// around the tunnel; 0 if nothing was estimated.

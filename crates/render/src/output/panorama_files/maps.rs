@@ -1,4 +1,5 @@
-//! Maps beside a panorama: coverage, frames, resolution, uncertainty, deformation, preview and gaps.
+//! Maps beside a panorama: coverage, frames, resolution, uncertainty, deformation, preview and
+//! gaps.
 
 use super::state::MapsState;
 use crate::compositing::band::Target;
