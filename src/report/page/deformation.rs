@@ -132,7 +132,7 @@ fn words(section: &SectionDeformation) -> Markup {
     };
     html! {
         @if let Some(change_mm) = section.radius_change_mm {
-            br; "radius " (with_sigma(change_mm, section.radius_sigma_mm)) " off"
+            br; "radius less nominal " (with_sigma(change_mm, section.radius_sigma_mm))
         }
         @if let Some(ovality_mm) = section.ovality_mm {
             br; "ovality " (with_sigma(ovality_mm, section.ovality_sigma_mm))
@@ -212,7 +212,7 @@ fn charts(sections: &[SectionDeformation]) -> Markup {
     html! {
         @if has_centre { (legend(&entries(&CENTRE), &[ChartElement::Band])) }
         div.charts {
-            (chart(sections, "Radius of the best-fit circle, minus nominal", Vertical::Linear, &[
+            (chart(sections, "Best-fit radius, minus nominal", Vertical::Linear, &[
                 ("radius", |s| [s.radius_change_mm, s.radius_sigma_mm]),
             ]))
             (chart(sections, "Centre of the best-fit circle", Vertical::Linear, &CENTRE))

@@ -285,7 +285,7 @@ mod tests {
         assert_near(
             section.rising_change_mm,
             2e3 * oval(std::f64::consts::FRAC_PI_4),
-            0.04,
+            0.2,
         );
         assert_eq!(
             (section.radius_sigma_mm, section.ovality_sigma_mm),
