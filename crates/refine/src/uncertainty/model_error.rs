@@ -193,7 +193,7 @@ impl ErrorDraws {
     }
 
     /// One draw of the errors of the slots from `first` on.
-    pub fn from_slot(&self, first: usize, draw: usize) -> Vec<FrameStep> {
+    pub fn of_slots(&self, first: usize, draw: usize) -> Vec<FrameStep> {
         self.slots[first..].iter().map(|slot| slot[draw]).collect()
     }
 

@@ -110,11 +110,12 @@ fn error_draws(shape: &Shape, covariance: &TotalCovariance, first_slot: usize) -
     let field = |draw: usize| {
         let drawn = Shape {
             model: shape.model.clone(),
-            coefficients: draws.from_slot(first_slot, draw),
+            coefficients: draws.of_slots(first_slot, draw),
         };
         drawn.field()
     };
-    (0..draws.count()).filter_map(field).collect()
+    let fields = (0..draws.count()).par_map(field);
+    fields.into_iter().flatten().collect()
 }
 
 /// 1-σ of the displacement by the prior alone, root mean square over a row in the middle of the
