@@ -139,7 +139,7 @@ mod tests {
             outline_m: normals.iter().map(|n| n.map(|c| 3.0 * c)).collect(),
             normals,
             deviation_mm: (0..180)
-                .map(|k| (k < 135).then(|| if k == 45 { 12.0 } else { 0.0 }))
+                .map(|k| (k < 135).then_some(if k == 45 { 12.0 } else { 0.0 }))
                 .collect(),
         }
     }
