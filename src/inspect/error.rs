@@ -3,6 +3,7 @@
 use crate::persist::atomic::WriteError;
 use crate::raster::RasterError;
 use crate::render::RenderError;
+use crate::survey::SurveyError;
 use std::path::PathBuf;
 
 /// Reason why a tunnel cannot be exported or shown.
@@ -65,6 +66,9 @@ pub enum InspectError {
     /// The panorama of the textures cannot be drawn.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// The shape of the wall cannot be read.
+    #[error(transparent)]
+    Survey(#[from] SurveyError),
     /// A file of the page has no JSON, which is a bug.
     #[error("cannot make JSON of {name}: {source}")]
     Json {

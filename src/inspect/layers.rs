@@ -1,12 +1,15 @@
 //! Layers of the page: panoramas of several trajectories, drawn as textures.
 
+use super::deformation_layer::{DEFORMATION_LAYER, DeformationPaint, FORMAT};
 use super::error::InspectError;
+use super::layer_values::{LayerValues, VALUES};
 use super::manifest::{MANIFEST, Manifest, PanoramaLayer, WALL, WallPoints};
 use super::server::SourceFrames;
 use super::tiles_target::{TilesTarget, tiles_px_per_metre};
+use crate::evaluate::deformation::{DeviationGrid, DeviationMap};
 use crate::persist::atomic;
 use crate::progress::Progress;
-use crate::render::{RenderError, RenderOptions, Stitch, StitchOptions, place_frames};
+use crate::render::{RenderError, RenderOptions, Stitch, StitchOptions, Target, place_frames};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, Shutter};
 use serde::Serialize;
@@ -74,9 +77,22 @@ pub fn draw_layers(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<(), InspectError> {
+    let map = DeviationMap::of_survey(survey)?;
+    let mut deformation = map
+        .as_ref()
+        .and_then(|map| Some((map, DeviationGrid::new(map)?)));
     let mut drawn = Vec::new();
     for layer in layers {
-        drawn.push(draw_layer(survey, layer, options, folder, progress)?);
+        // The deformation is painted over the first panorama.
+        let deformation = deformation.take();
+        drawn.extend(draw_layer(
+            survey,
+            layer,
+            deformation,
+            options,
+            folder,
+            progress,
+        )?);
     }
     let surface = survey.surface.as_ref();
     let frames = survey.frames.iter().map(|frame| frame.name()).collect();
@@ -87,27 +103,50 @@ pub fn draw_layers(
     write_json(folder, WALL, &wall)
 }
 
-/// Draws one layer into its folder within `folder`.
+/// Draws one layer into its folder within `folder`, and the deformation over its panorama into
+/// another, if it is given.
 fn draw_layer(
     survey: &Survey,
     layer: &PosedLayer,
+    deformation: Option<(&DeviationMap, DeviationGrid)>,
     options: &TextureOptions,
     folder: &Path,
     progress: &dyn Progress,
-) -> Result<PanoramaLayer, InspectError> {
+) -> Result<Vec<PanoramaLayer>, InspectError> {
     let mut stitch = lay_out_texture(survey, &layer.poses, &layer.shutter, options)?;
     let (canvas, format) = (*stitch.canvas(), stitch.frames().format());
-    let place = folder.join(layer.name);
-    atomic::create_folder(&place)?;
     let surface = survey.surface.as_ref();
-    let mut tiles = TilesTarget::new(surface, &canvas, format, &place, options.quality)?;
-    let map = tiles.with_map(&canvas)?;
-    let budget = stitch.budget(tiles.max_bytes())?;
+    let begin = |name: &str, format| -> Result<(TilesTarget, PanoramaLayer), InspectError> {
+        let place = folder.join(name);
+        atomic::create_folder(&place)?;
+        let mut tiles = TilesTarget::new(surface, &canvas, format, &place, options.quality)?;
+        let map = tiles.with_map(&canvas)?;
+        Ok((tiles, PanoramaLayer::new(name, &canvas, map, &layer.poses)))
+    };
+    let (mut tiles, shown) = begin(layer.name, format)?;
+    let mut drawn = vec![shown];
+    let mut max_bytes = tiles.max_bytes();
+    let mut paint = None;
+    if let Some((map, grid)) = deformation {
+        let (painted, shown) = begin(DEFORMATION_LAYER, FORMAT)?;
+        drawn.push(shown.with_values(LayerValues::new(&grid)));
+        max_bytes += painted.max_bytes();
+        write_json(folder, VALUES, &grid)?;
+        paint = Some(DeformationPaint::new(painted, map, grid.size_mm()));
+    }
+    let budget = stitch.budget(max_bytes)?;
     let settled = stitch.settle(&budget, progress)?;
     let (plan, frames) = stitch.plan(settled);
-    plan.draw(frames, budget.room, &mut [&mut tiles], progress)?;
+    let mut targets: Vec<&mut dyn Target> = vec![&mut tiles];
+    if let Some(paint) = &mut paint {
+        targets.push(paint);
+    }
+    plan.draw(frames, budget.room, &mut targets, progress)?;
     tiles.finish(&canvas)?;
-    Ok(PanoramaLayer::new(layer.name, &canvas, map, &layer.poses))
+    if let Some(paint) = paint {
+        paint.tiles.finish(&canvas)?;
+    }
+    Ok(drawn)
 }
 
 /// Places the frames of a survey with the poses of every layer, for the page's view of the frames.
@@ -123,6 +162,10 @@ pub fn pose_source_frames(
     for layer in layers {
         let placed = place_frames(surface, &survey.camera, &layer.poses, &layer.shutter)?;
         placements.push((layer.name.to_owned(), placed));
+    }
+    // The deformation is painted over the first.
+    if let (Some((_, first)), true) = (placements.first(), survey.displacement.is_some()) {
+        placements.push((DEFORMATION_LAYER.to_owned(), first.clone()));
     }
     Ok(SourceFrames {
         surface: survey.surface,

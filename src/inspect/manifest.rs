@@ -1,6 +1,7 @@
 //! Metadata of the viewer's page besides the tiles: `tunnel.json` and `wall.json`.
 
 use crate::camera::Camera;
+use crate::inspect::layer_values::LayerValues;
 use crate::inspect::level_strip::BORDER;
 use crate::inspect::mesh::{GridLines, WallRectangle};
 use crate::inspect::tileset::TILESET;
@@ -64,6 +65,9 @@ pub struct PanoramaLayer {
     map: MapImages,
     /// Poses of the frames, camera-to-world: position (m) and quaternion, x y z w.
     poses: Vec<[f64; 7]>,
+    /// Values that it shows besides the picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    values: Option<LayerValues>,
 }
 
 /// Images of the map, `folder/ROW.jpg`: the textures of one level, θ to the right, chainage down.
@@ -109,6 +113,15 @@ impl PanoramaLayer {
             chainage_m: canvas.chainage_m(),
             map,
             poses: poses.iter().map(numbers).collect(),
+            values: None,
+        }
+    }
+
+    /// The layer with values.
+    pub(super) fn with_values(self, values: LayerValues) -> Self {
+        Self {
+            values: Some(values),
+            ..self
         }
     }
 }

@@ -32,10 +32,12 @@
 //! ```
 
 mod block_cutter;
+mod deformation_layer;
 mod error;
 mod export;
 mod glb;
 mod glb_target;
+mod layer_values;
 mod layers;
 mod level_strip;
 mod manifest;
@@ -46,9 +48,11 @@ mod tiles_target;
 mod tileset;
 mod viewer;
 
+pub use deformation_layer::DEFORMATION_LAYER;
 pub use error::InspectError;
 pub use export::{ExportFiles, export_page, export_wall};
 pub use glb_target::GlbTarget;
+pub use layer_values::LayerValues;
 pub use layers::{PosedLayer, TextureOptions, draw_layers, pose_source_frames};
 pub use manifest::{MANIFEST, Manifest, MapImages, PanoramaLayer, WALL, WallPoints};
 pub use marks::{Geometry, MARKS_CSV, MARKS_GEOJSON, Mark, Marks, Properties};

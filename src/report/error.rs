@@ -42,6 +42,14 @@ pub enum ReportError {
         /// Error of the parser.
         what: String,
     },
+    /// `sections.csv` is malformed.
+    #[error("{}: {what}; refine the survey again", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// Line and error.
+        what: String,
+    },
     /// `refine.json` is of another survey.
     #[error(
         "{}: has {found} frames, but the survey has {frames}; give the folder that refine has \

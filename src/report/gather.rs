@@ -1,5 +1,6 @@
 //! Computes the numbers of the report from its sources.
 
+use super::deformation::gather_deformation;
 use super::error::ReportError;
 use super::model::{
     Abscissa, FrameRow, Report, ResultSummary, SCHEMA_VERSION, SurveyFacts, WallMaps,
@@ -69,6 +70,7 @@ pub fn gather(sources: Sources) -> Result<(Report, Pictures), ReportError> {
         comparison: comparison.clone(),
         panoramas,
         wall,
+        deformation: gather_deformation(survey, &refined)?,
         thumbnails,
         refinement: refined.refinement,
     };

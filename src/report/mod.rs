@@ -14,6 +14,7 @@
 //! | module | content |
 //! | --- | --- |
 //! | [`model`] | numbers of the report, computed by [`gather()`] |
+//! | [`deformation`] | deformation of the wall |
 //! | [`refined_files`] | files that refine has written |
 //! | [`pictures`] | strips of the panoramas, thumbnails |
 //! | [`resolution`] | resolution of the compared panoramas |
@@ -23,6 +24,7 @@
 
 mod chart;
 mod decimate;
+mod deformation;
 mod error;
 mod gather;
 mod heat_map;
@@ -34,6 +36,7 @@ mod refined_files;
 mod resolution;
 mod ticks;
 
+pub use deformation::Deformation;
 pub use error::ReportError;
 pub use gather::{Sources, gather};
 pub use model::{
@@ -43,6 +46,6 @@ pub use model::{
 pub use page::page;
 pub use pictures::{PICTURES, Pictures};
 pub use refined_files::{
-    CalibratedUnknown, Calibration, REFINEMENT_FILE, RefinedFiles, Refinement,
+    CalibratedUnknown, Calibration, REFINEMENT_FILE, RefinedFiles, Refinement, SECTIONS_FILE,
 };
 pub use resolution::choose_resolution;

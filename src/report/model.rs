@@ -3,6 +3,7 @@
 //! Names end with the unit: metres, degrees, 8-bit grey levels. Numbers that do not exist (no true
 //! poses, no covariance) are null or missing. Lists of frames are in the order of the survey.
 
+use super::deformation::Deformation;
 use super::refined_files::Refinement;
 use crate::evaluate::Comparison;
 use crate::render::Layout;
@@ -37,6 +38,9 @@ pub struct Report {
     pub panoramas: PanoramaStrips,
     /// Residuals and overlap on the wall.
     pub wall: WallMaps,
+    /// Deformation of the wall; null if none was found.
+    #[serde(default)]
+    pub deformation: Option<Deformation>,
     /// Thumbnails of the first flagged frames.
     pub thumbnails: Vec<Thumbnail>,
     /// Report of refine; null for poses of another program.

@@ -1,6 +1,7 @@
 //! Files that `refine` has written.
 
 use super::error::ReportError;
+use crate::evaluate::deformation::{SectionDeformation, read_sections};
 use crate::refine::{
     FrameReport, LevelReport, PriorTest, StageTime, SurveyVerdict, read_covariances,
 };
@@ -83,6 +84,8 @@ pub struct CalibratedUnknown {
 
 /// Name of refine's report beside the poses.
 pub const REFINEMENT_FILE: &str = "refine.json";
+/// Name of the table of sections beside the poses.
+pub const SECTIONS_FILE: &str = "sections.csv";
 /// Name of the covariances beside the poses.
 const COVARIANCES: &str = "covariance.csv";
 
@@ -98,6 +101,8 @@ pub struct RefinedFiles {
     /// Covariances of the poses ([`crate::refine::Covariances::frames`]), if `covariance.csv`
     /// exists.
     pub covariances: Option<Vec<Matrix6<f64>>>,
+    /// Deformation of the wall's sections, if `sections.csv` exists.
+    pub sections: Option<Vec<SectionDeformation>>,
 }
 
 impl RefinedFiles {
@@ -127,7 +132,9 @@ impl RefinedFiles {
         let count = survey.frames.len();
         let refinement = beside(REFINEMENT_FILE).map(|path| read_refinement(&path, count));
         let covariances = beside(COVARIANCES).map(|path| read_covariances(&path, count));
+        let sections = beside(SECTIONS_FILE).map(|path| read_section_file(&path));
         Ok(Self {
+            sections: sections.transpose()?,
             refinement: refinement.transpose()?,
             covariances: covariances.transpose()?,
             path: poses_path,
@@ -141,10 +148,22 @@ impl RefinedFiles {
         let others = [
             beside(REFINEMENT_FILE, self.refinement.is_some()),
             beside(COVARIANCES, self.covariances.is_some()),
+            beside(SECTIONS_FILE, self.sections.is_some()),
         ];
         let poses = std::iter::once(self.path.clone());
         poses.chain(others.into_iter().flatten()).collect()
     }
+}
+
+fn read_section_file(path: &Path) -> Result<Vec<SectionDeformation>, ReportError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ReportError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    read_sections(&text).map_err(|what| ReportError::Table {
+        path: path.to_owned(),
+        what,
+    })
 }
 
 fn read_refinement(path: &Path, frames: usize) -> Result<Refinement, ReportError> {

@@ -1,9 +1,12 @@
 //! Walls that are not as drawn: their shape is estimated with the poses, and used by all commands.
 
 use crate::support::{edit, fail, json, simulate, succeed, text};
+use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use tempfile::TempDir;
+use tunnelstitch::evaluate::deformation::{SectionDeformation, read_sections};
+use tunnelstitch::simulate::{AsBuilt, Scene, SimulateOptions};
 
 /// An oval, undulating tunnel of which the survey says that it is round, refined.
 static OVAL: LazyLock<TempDir> = LazyLock::new(|| {
@@ -84,6 +87,161 @@ fn a_shape_is_taken_up_from_a_file() {
     let message = fail(&["check", text(&other)], 3);
     assert!(message.contains("shape.json"), "{message}");
     assert!(message.contains("another tunnel"), "{message}");
+}
+
+/// The lining of [`OVAL`], as simulated.
+fn lining() -> Scene {
+    let as_built = AsBuilt {
+        ovality_mm: 10.0,
+        undulation_mm: 2.0,
+        undulation_length_m: 1.5,
+    };
+    let options = SimulateOptions {
+        frames: 2,
+        as_built,
+        seed: 5,
+        ..SimulateOptions::free()
+    };
+    Scene::new(&options).unwrap()
+}
+
+/// `sections.csv` of the refined survey.
+fn sections() -> Vec<SectionDeformation> {
+    let table = std::fs::read_to_string(refined("auto").join("sections.csv")).unwrap();
+    read_sections(&table).unwrap()
+}
+
+/// Figures of every section against those of the simulated lining, in units of the stated σ. The
+/// angle of the result is that of the initial poses, so only what does not depend on it is
+/// compared.
+#[test]
+fn sections_are_those_of_the_lining_within_their_sigma() {
+    let (lining, sections) = (lining(), sections());
+    assert!(sections.len() >= 5, "{} sections", sections.len());
+    assert!(!refined("fixed").join("sections.csv").exists());
+    let mut normalised: Vec<[f64; 3]> = Vec::new();
+    for section in &sections {
+        let h_m = section.chainage_m.unwrap();
+        let angle = |k: i32| TAU * f64::from(k) / 720.0;
+        let delta_mm = |theta: f64| 1e3 * lining.lining_deviation_m(theta, h_m);
+        let diameters: Vec<f64> = (0..360)
+            .map(|k| delta_mm(angle(k)) + delta_mm(angle(k) + PI))
+            .collect();
+        let max_mm = diameters.iter().copied().fold(f64::MIN, f64::max);
+        let min_mm = diameters.iter().copied().fold(f64::MAX, f64::min);
+        let mean = |weight: &dyn Fn(f64) -> f64| {
+            let terms = (0..720).map(|k| weight(angle(k)) * delta_mm(angle(k)));
+            terms.sum::<f64>() / 720.0
+        };
+        let cosine = 2.0 * mean(&|theta| (2.0 * theta).cos());
+        let sine = 2.0 * mean(&|theta| (2.0 * theta).sin());
+        let errors = [
+            (
+                section.ovality_mm,
+                max_mm - min_mm,
+                section.ovality_sigma_mm,
+            ),
+            (
+                section.second_harmonic_mm,
+                cosine.hypot(sine),
+                section.second_harmonic_sigma_mm,
+            ),
+            (
+                section.radius_change_mm,
+                mean(&|_| 1.0),
+                section.radius_sigma_mm,
+            ),
+        ];
+        normalised
+            .push(errors.map(|(found, truth, sigma)| (found.unwrap() - truth) / sigma.unwrap()));
+    }
+    for (k, figure) in ["ovality", "second harmonic", "radius"]
+        .into_iter()
+        .enumerate()
+    {
+        let largest = normalised.iter().map(|n| n[k].abs()).fold(0.0, f64::max);
+        assert!(largest < 3.0, "{figure}: {largest} σ, of {normalised:?}");
+    }
+}
+
+/// `deformation.tif` has the deviation from the best-fit circle on the axes of the other maps, and
+/// the report shows it.
+#[test]
+fn the_deformation_is_a_map_and_a_part_of_the_report() {
+    let dir = tempfile::tempdir().unwrap();
+    let (maps, report) = (dir.path().join("maps"), dir.path().join("report"));
+    let (panorama, survey) = (dir.path().join("wall.tif"), survey());
+    let poses = refined("auto").join("poses.tum");
+    let arguments = ["stitch", text(&survey), "--poses", text(&poses), "--out"];
+    let files = [
+        text(&panorama),
+        "--maps",
+        text(&maps),
+        "--px-per-metre",
+        "20",
+    ];
+    succeed(&[&arguments[..], &files].concat());
+    let (size, deviations_mm) = read_map(&maps.join("deformation.tif"));
+    let (sigma_size, sigmas_mm) = read_map(&maps.join("deformation_sigma.tif"));
+    assert_eq!(size, read_map(&maps.join("resolution.tif")).0);
+    assert_eq!(size, sigma_size);
+    let known: Vec<f64> = deviations_mm
+        .iter()
+        .copied()
+        .filter(|d| d.is_finite())
+        .collect();
+    assert!(2 * known.len() > deviations_mm.len());
+    assert!(
+        sigmas_mm
+            .iter()
+            .zip(&deviations_mm)
+            .all(|(s, d)| s.is_nan() == d.is_nan())
+    );
+    let rms_mm = |of: &[f64]| (of.iter().map(|d| d * d).sum::<f64>() / of.len() as f64).sqrt();
+    // 10 mm cos 2θ and 2 mm of undulation are 7.3 mm RMS.
+    assert!((6.3..8.3).contains(&rms_mm(&known)), "{}", rms_mm(&known));
+    // The mean around the section is part of the circle. The rows of the middle are known whole.
+    let [width, height] = size;
+    let row = &deviations_mm[height / 2 * width..][..width];
+    let mean_mm = row.iter().sum::<f64>() / width as f64;
+    assert!(mean_mm.abs() < 0.05, "{mean_mm}");
+    let refined = refined("auto");
+    succeed(&[
+        "report",
+        text(&survey),
+        "--refined",
+        text(&refined),
+        "--out",
+        text(&report),
+    ]);
+    let page = std::fs::read_to_string(report.join("report.html")).unwrap();
+    for part in [
+        "id=\"deformation\"",
+        "best-fit circle",
+        "ovality",
+        "times exaggerated",
+    ] {
+        assert!(page.contains(part), "no {part}");
+    }
+    let found = &json(&report.join("report.json"))["deformation"];
+    assert_eq!(
+        found["sections"].as_array().unwrap().len(),
+        sections().len()
+    );
+}
+
+/// Width and height, and the values of a map in single precision.
+fn read_map(path: &Path) -> ([usize; 2], Vec<f64>) {
+    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+    let mut decoder = tiff::decoder::Decoder::new(file).unwrap();
+    let (width, height) = decoder.dimensions().unwrap();
+    match decoder.read_image().unwrap() {
+        tiff::decoder::DecodingResult::F32(values) => (
+            [width as usize, height as usize],
+            values.into_iter().map(f64::from).collect(),
+        ),
+        _ => panic!("{} is not of single precision", path.display()),
+    }
 }
 
 /// Pixels of a frame, located with the shape beside the poses, and pixels that show no wall.

@@ -7,6 +7,7 @@
 pub const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
 
 pub mod bitmap_text;
+pub mod colour_map;
 pub mod frames;
 pub mod persist;
 pub mod progress;

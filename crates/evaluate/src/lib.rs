@@ -9,6 +9,7 @@
 //! | sharpness of a panorama | [`mtf50`] |
 //! | consistency of the frames, without truth | [`seam_residual()`], as a map [`SeamMap`] |
 //! | consistency of the stated covariances | [`normalised_errors_squared`] |
+//! | deformation of the wall against best-fit circles | [`deformation`] |
 //! | noise of the initial poses that the refinement tolerates | [`converge`] |
 //!
 //! [`compare()`] computes the measures for initial and refined poses.
@@ -33,6 +34,7 @@ mod before_after;
 mod compare;
 mod comparison_table;
 pub mod converge;
+pub mod deformation;
 mod error;
 mod error_statistics;
 mod image_metrics;

@@ -69,7 +69,9 @@ pub use output::cylinder;
 pub use output::gaps::{Coverage, Gap, gaps_csv};
 pub use output::maps::Map;
 pub use output::panorama::Panorama;
-pub use output::panorama_files::{CheckpointedFiles, PanoramaFileOptions, PanoramaFiles};
+pub use output::panorama_files::{
+    CheckpointedFiles, DeformationAt, PanoramaFileOptions, PanoramaFiles,
+};
 pub use output::plan::{Plan, Settled};
 pub use output::preview::Preview;
 pub use output::raster_target::{Kept, RasterLayer, RasterState, RasterTarget};

@@ -123,6 +123,12 @@ impl Scene {
         self.path.poses()
     }
 
+    /// Deviation of the lining from the nominal radius at an angle (radians, from twelve o'clock
+    /// towards three) and a chainage (metres), metres outwards; 0 of a wall that is as planned.
+    pub fn lining_deviation_m(&self, theta: f64, h_m: f64) -> f64 {
+        self.tunnel.deviation_m(theta, h_m)
+    }
+
     /// Gain and bias of a frame.
     pub fn exposure(&self, frame: usize) -> GainBias {
         GainBias::draw(&self.options, frame)

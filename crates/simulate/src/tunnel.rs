@@ -77,6 +77,14 @@ impl Tunnel {
         }
     }
 
+    /// Deviation of a lining from its nominal radius, metres.
+    pub fn deviation_m(&self, theta: f64, h_m: f64) -> f64 {
+        match self {
+            Self::AsBuilt(lining) => lining.deviation_m(theta, h_m),
+            Self::Round(_) | Self::Shaped { .. } => 0.0,
+        }
+    }
+
     /// Minimum distance of the wall from the axis, metres.
     pub fn nearest_m(&self) -> f64 {
         match self {

@@ -24,8 +24,10 @@ pub struct OutputArguments {
     dzi: Option<PathBuf>,
     /// Also write maps into DIR: coverage.tif, frames.tif (index of the frame that each pixel
     /// shows), resolution.tif (mm of wall per pixel of that frame), uncertainty.tif (1-σ of the
-    /// position on the wall, mm; needs --covariance), preview.png with chainage and clock
-    /// positions, gaps.csv.
+    /// position on the wall, mm; needs --covariance), deformation.tif and deformation_sigma.tif
+    /// (deviation of the wall from the best-fit circle of its section, outwards, and 1-σ, mm; if
+    /// refine has found that the wall is deformed), preview.png with chainage and clock positions,
+    /// gaps.csv.
     #[arg(long, value_name = "DIR")]
     maps: Option<PathBuf>,
     /// The covariance.csv that refine writes beside the poses

@@ -254,12 +254,18 @@ fn open_as_found(
     Ok(opened?)
 }
 
-/// Takes camera and wall from the survey.toml that `refine` has written beside `poses`, if it has.
+/// Takes camera and wall from the survey.toml that `refine` has written beside `poses`, or into the
+/// folder `poses`, if it has.
 ///
 /// # Errors
 /// A malformed file.
 fn take_over_found(file: &mut SurveyFile, poses: &Path) -> Result<(), SurveyError> {
-    let Some(folder) = poses.parent() else {
+    let folder = if poses.is_dir() {
+        Some(poses)
+    } else {
+        poses.parent()
+    };
+    let Some(folder) = folder else {
         return Ok(());
     };
     let beside = folder.join(SURVEY_FILE);

@@ -9,7 +9,7 @@ use crate::refine::{
     CalibrationReport, FrameFlag, FrameReport, ReadoutEstimate, RefineOptions, RefineReport,
     Refined, ShapeMode, search_pose_conventions,
 };
-use crate::report::REFINEMENT_FILE;
+use crate::report::{REFINEMENT_FILE, SECTIONS_FILE};
 use crate::survey::{CalibrationGroup, Survey};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,8 +18,9 @@ use std::sync::Arc;
 ///
 /// Reads SURVEY/survey.toml and writes into DIR: poses.tum (camera to world, for evo and other
 /// programs that read TUM), refine.json (costs, residuals, gains, 1-σ of every frame, timings) and
-/// covariance.csv (6 × 6 covariances of every frame and of neighbours). If the run is interrupted,
-/// the same command continues it.
+/// covariance.csv (6 × 6 covariances of every frame and of neighbours); shape.json and sections.csv
+/// (best-fit circle, ovality, convergence chords along the tunnel, with 1-σ) if the wall deviates
+/// from the given shape. If the run is interrupted, the same command continues it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch refine my-survey --out refined\n  \
@@ -261,6 +262,18 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
         poses.display(),
         arguments.out.join(REFINEMENT_FILE).display()
     ));
+    let shape = report
+        .shape
+        .as_ref()
+        .filter(|shape| !shape.scales.is_empty());
+    if let Some(shape) = shape.filter(|_| arguments.out.join(SECTIONS_FILE).is_file()) {
+        terminal.say(format!(
+            "the wall deviates from the given shape by {:.1} mm (root mean square): {} has its \
+             sections, `tunnelstitch report` draws them",
+            shape.rms_mm,
+            arguments.out.join(SECTIONS_FILE).display()
+        ));
+    }
     if report.calibration.is_some() {
         terminal.say(format!(
             "{out} is a survey with the refined calibration: tunnelstitch stitch {out} --poses {} \

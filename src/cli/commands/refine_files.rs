@@ -2,11 +2,15 @@
 
 use crate::camera::format_calibration;
 use crate::cli::output::{Failure, RunRecord, Terminal, json};
+use crate::evaluate::deformation::{
+    ShapeEstimate, deviation_sigmas_m, measure_sections, sections_csv,
+};
 use crate::persist::atomic;
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
-use crate::refine::{RefineOptions, RefineReport, Refined, refine_with_checkpoint};
-use crate::report::REFINEMENT_FILE;
+use crate::refine::{EstimatedShape, RefineOptions, RefineReport, Refined, refine_with_checkpoint};
+use crate::report::{REFINEMENT_FILE, SECTIONS_FILE};
+use crate::surface::Bend;
 use crate::survey::{FoundFiles, SURVEY_FILE, ShapeFile, Survey, SurveyFile};
 use crate::trajectory::tum;
 use serde::Serialize;
@@ -36,7 +40,8 @@ struct RefineFile<'a> {
 }
 
 /// Refines a survey, continuing from a checkpoint if there is one, and writes poses.tum,
-/// refine.json and covariance.csv into `out`. Also returns the text of refine.json.
+/// refine.json and covariance.csv into `out`, shape.json and sections.csv if the wall is deformed.
+/// Also returns the text of refine.json.
 ///
 /// # Errors
 /// Bad input, or an output that cannot be written.
@@ -97,23 +102,48 @@ fn write_survey(survey: &Survey, refined: &Refined, out: &Path) -> Result<(), Fa
     };
     let camera = calibration.map(|calibration| format_calibration(&calibration.camera));
     text_of(CAMERA_FILE, camera)?;
-    let shape = shape_file(refined, survey.nominal.perimeter_m());
-    text_of(SHAPE_FILE, shape.as_ref().map(json::text).transpose()?)?;
+    let is_found = refined.shape.is_some() || refined.bend.is_some();
     let file = survey.as_found(&FoundFiles {
         calibration: calibration.map(|calibration| (CAMERA_FILE, calibration.radius_m)),
-        shape_file: shape.map(|_| SHAPE_FILE),
+        shape_file: is_found.then_some(SHAPE_FILE),
     });
+    let (shape, sections) = match (&refined.shape, refined.bend) {
+        (Some(shape), bend) => {
+            let (shape, sections) = shape_files(shape, bend, &file, out)?;
+            (Some(shape), Some(sections))
+        }
+        (None, Some(bend)) => {
+            let shape = ShapeFile::of_bend(bend, survey.nominal.perimeter_m());
+            (Some(json::text(&shape)?), None)
+        }
+        (None, None) => (None, None),
+    };
+    text_of(SHAPE_FILE, shape)?;
+    text_of(SECTIONS_FILE, sections)?;
     let text = toml::to_string(&file).map_err(|error| Failure::bug(error.to_string()))?;
     let text = format!("# The survey with the camera and the wall that refine has found.\n{text}");
     Ok(atomic::write_text(&out.join(SURVEY_FILE), &text)?)
 }
 
-/// The wall's shape with the tunnel's bend, if there is either; `perimeter_m` of the tunnel.
-fn shape_file(refined: &Refined, perimeter_m: f64) -> Option<ShapeFile> {
-    let shape = refined.shape.as_ref();
-    let shape = shape.map(|shape| ShapeFile::new(&shape.field, shape.sigma_m.clone()));
-    match (shape, refined.bend) {
-        (Some(shape), bend) => Some(shape.with_bend(bend)),
-        (None, bend) => bend.map(|bend| ShapeFile::of_bend(bend, perimeter_m)),
-    }
+/// Texts of shape.json and of sections.csv, for the tunnel of `file`.
+fn shape_files(
+    shape: &EstimatedShape,
+    bend: Option<Bend>,
+    file: &SurveyFile,
+    out: &Path,
+) -> Result<(String, String), Failure> {
+    let nominal = file.tunnel.surface(&out.join(SURVEY_FILE), out)?;
+    let estimate = ShapeEstimate {
+        nominal: nominal.as_ref(),
+        field: &shape.field,
+        error_draws: &shape.error_draws,
+        prior_sigma_m: shape.prior_sigma_m,
+        extent_h_m: shape.extent_h_m,
+    };
+    let deviation_sigmas_m = deviation_sigmas_m(&estimate);
+    let sections = measure_sections(&estimate, &deviation_sigmas_m);
+    let shape_file = ShapeFile::new(&shape.field, shape.sigma_m.clone())
+        .with_deviation_sigma_m(deviation_sigmas_m)
+        .with_bend(bend);
+    Ok((json::text(&shape_file)?, sections_csv(&sections)))
 }

@@ -5,12 +5,15 @@ use crate::cli::arguments::{
     memory_size, resume,
 };
 use crate::cli::output::{Failure, RunRecord, Terminal, json, record};
+use crate::evaluate::deformation::DeviationMap;
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::read_covariances;
 use crate::render::{
-    Budget, CheckpointedFiles, FrameExposure, Gap, Layout, RenderOptions, Stitch, StitchOptions,
+    Budget, CheckpointedFiles, DeformationAt, FrameExposure, Gap, Layout, RenderOptions, Stitch,
+    StitchOptions,
 };
+use crate::surface::WallPoint;
 use crate::survey::Survey;
 use crate::trajectory::poses_of;
 use nalgebra::Matrix6;
@@ -81,6 +84,7 @@ struct StitchRun<'a> {
     options: StitchOptions,
     layout: Layout,
     covariances: Option<Vec<Matrix6<f64>>>,
+    deformation: Option<DeviationMap>,
     terminal: &'a Terminal,
 }
 
@@ -103,6 +107,11 @@ pub fn run(
         options: arguments.options(),
         layout: arguments.picture.canvas.layout.into(),
         covariances: read_pose_covariances(arguments, &survey)?,
+        deformation: if output.has_maps() {
+            DeviationMap::of_survey(&survey)?
+        } else {
+            None
+        },
         terminal,
     };
     let mut stitch = Stitch::new(
@@ -216,7 +225,15 @@ impl StitchRun<'_> {
         let gaps = files.gaps(self.survey.surface.as_ref());
         terminal.start("writing", 1);
         let camera = &self.survey.camera;
-        let written = files.finish(&plan, &gaps, camera, self.covariances.as_deref());
+        let deformation = self.deformation.as_ref();
+        let deformation_at = deformation.map(|map| |wall: WallPoint| map.at_mm(wall));
+        let written = files.finish(
+            &plan,
+            &gaps,
+            camera,
+            self.covariances.as_deref(),
+            deformation_at.as_ref().map(|at| at as &DeformationAt),
+        );
         terminal.finish();
         written?;
         let [width, height] = self.layout.size(&canvas);

@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 ///
 /// The page is served on 127.0.0.1, for this machine only, until Ctrl-C. Marks are kept in
 /// marks.geojson and marks.csv beside survey.toml (or in the folder of `export --web`); nothing
-/// else is written.
+/// else is written. If refine has found that the wall is deformed, a layer shows the deviation from
+/// best-fit circles with the value under the pointer.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch view my-survey --poses refined/poses.tum\n      \

@@ -158,6 +158,7 @@ impl From<InspectError> for Failure {
             InspectError::Raster(error) => error.into(),
             InspectError::Write(error) => error.into(),
             InspectError::Render(error) => error.into(),
+            InspectError::Survey(error) => error.into(),
             InspectError::Json { .. } => Self::bug(error.to_string()),
             InspectError::TooLong { .. } | InspectError::NoViewer | InspectError::Listen { .. } => {
                 Self::usage(error.to_string())

@@ -2,7 +2,8 @@
 
 use super::page_data::PageData;
 use super::{
-    convergence, corrections, errors, flagged, panorama, parameters, summary, trajectory, wall_maps,
+    convergence, corrections, deformation, errors, flagged, panorama, parameters, summary,
+    trajectory, wall_maps,
 };
 use crate::report::error::ReportError;
 use crate::report::model::Report;
@@ -25,6 +26,7 @@ pub fn page(report: &Report, pictures: &Pictures) -> Result<String, ReportError>
             "Residual and overlap",
             Some(wall_maps::section(&data)?),
         ),
+        ("deformation", "Deformation", deformation::section(&data)?),
         ("trajectory", "Trajectory", Some(trajectory::section(&data))),
         (
             "corrections",

@@ -6,12 +6,15 @@
 
 mod convergence;
 mod corrections;
+mod deformation;
 mod document;
 mod errors;
 mod flagged;
+mod map_strip;
 mod page_data;
 mod panorama;
 mod parameters;
+mod section_plot;
 mod summary;
 mod trajectory;
 mod wall_maps;

@@ -1,15 +1,16 @@
 //! Section about residuals and overlap on the wall, and about each frame's photometric fit.
 
-use super::page_data::{PageData, data_uri};
+use super::map_strip::{MapStrip, scale_legend};
+use super::page_data::PageData;
 use super::trajectory::mark_entry;
 use crate::refine::FrameReport;
 use crate::report::chart::{Chart, CurveStyle, Series, Vertical, legend};
 use crate::report::error::ReportError;
-use crate::report::heat_map::{self, ColourScale};
+use crate::report::heat_map::ColourScale;
 use crate::report::model::WallMaps;
 use crate::report::quantity::short;
-use crate::report::ticks;
 use maud::{Markup, html};
+use tunnelstitch_core::colour_map::Palette;
 
 /// Draws the section.
 ///
@@ -25,6 +26,7 @@ pub fn section(data: &PageData) -> Result<Markup, ReportError> {
         .collect();
     let most = maps.refined_frames.iter().copied().fold(1.0, f64::max);
     let overlap = ColourScale {
+        palette: Palette::Cividis,
         range: [0.0, most],
         logarithmic: false,
     };
@@ -132,6 +134,7 @@ fn residual_scale(maps: &WallMaps) -> ColourScale {
     };
     let (low, high) = (at(0.01).unwrap_or(1.0), at(0.99).unwrap_or(10.0));
     ColourScale {
+        palette: Palette::Cividis,
         range: [low, high.max(1.5 * low)],
         logarithmic: true,
     }
@@ -144,47 +147,14 @@ fn strip(
     values: &[Option<f64>],
     scale: &ColourScale,
 ) -> Result<Markup, ReportError> {
-    let png = heat_map::png(title, [maps.around, maps.along], values, scale)?;
-    let [from_m, to_m] = maps.chainage_m;
     let mut known: Vec<f64> = values.iter().copied().flatten().collect();
     known.sort_unstable_by(f64::total_cmp);
-    let middle = known.get(known.len() / 2).copied();
-    let words = match middle {
-        Some(middle) => format!("{title}: median {} over the wall", short(middle)),
-        None => format!("{title}: no values"),
-    };
-    Ok(html! {
-        figure.strip {
-            figcaption {
-                span { (title) }
-                @if let Some(middle) = middle { span.reading { "median " (short(middle)) } }
-            }
-            div.side aria-hidden="true" {
-                @for (top, text) in [(0, "12"), (25, "9"), (50, "6"), (75, "3"), (100, "12")] {
-                    span style=(format!("top:{top}%")) { (text) }
-                }
-            }
-            img src=(data_uri("image/png", &png)) alt=(words)
-                width=(maps.along) height=(maps.around);
-            div.below aria-hidden="true" {
-                @for (h_m, text) in ticks::linear(from_m, to_m, 6) {
-                    @let left = 100.0 * (h_m - from_m) / (to_m - from_m);
-                    span style=(format!("left:{left:.2}%")) { (text) " m" }
-                }
-            }
-        }
-    })
-}
-
-/// Legend of a colour scale.
-fn scale_legend(words: &str, scale: &ColourScale) -> Markup {
-    let [low, high] = scale.range;
-    html! {
-        p.scale {
-            span { (short(low)) }
-            span.bar style=(format!("background:{}", heat_map::gradient())) {}
-            span { (short(high)) }
-            span.words { (words) }
-        }
+    let middle = known.get(known.len() / 2);
+    MapStrip {
+        title,
+        size: [maps.around, maps.along],
+        chainage_m: maps.chainage_m,
+        reading: middle.map(|middle| format!("median {}", short(*middle))),
     }
+    .draw(values, scale)
 }

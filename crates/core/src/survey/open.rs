@@ -7,6 +7,7 @@ use super::file::{SURVEY_FILE, SurveyFile};
 use super::frame_list::FrameList;
 use super::pose_reader::{InterpretedPoses, PoseReader};
 use super::poses_section::PosesSection;
+use super::shape_file::ShapeFile;
 use super::{ignore, pose_validation};
 use crate::frames::{FrameSet, Mask};
 use std::path::{Path, PathBuf};
@@ -294,6 +295,17 @@ impl Survey {
     pub fn shutter(&self) -> Shutter {
         let readout_s = 1e-3 * self.file.camera.readout_ms.unwrap_or_default();
         Shutter::new(readout_s, self.camera.height, &self.initial)
+    }
+
+    /// Reads the file of the wall's displacement, with its uncertainty; None if the wall has none.
+    ///
+    /// # Errors
+    /// A file that has become unreadable since the survey was opened.
+    pub fn shape_file(&self) -> Result<Option<ShapeFile>, SurveyError> {
+        let file = self.file.tunnel.shape_file.as_ref();
+        let read =
+            |file: &PathBuf| ShapeFile::read(&self.folder.join(file), self.nominal.perimeter_m());
+        file.map(read).transpose()
     }
 
     /// The initial poses without their times.

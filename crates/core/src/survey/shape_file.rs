@@ -7,6 +7,7 @@
 //!   "origin": { "s_m": 0.0, "h_m": 0.0 }, "first_row": -3,
 //!   "coefficients_m": [0.0012, 0.0009],
 //!   "sigma_m": [0.0001, 0.0001],
+//!   "deviation_sigma_m": [0.00008, null],
 //!   "bend": { "curvature_per_m": [0.0033, 0.0], "at_h_m": 2.35 }
 //! }
 //! ```
@@ -15,7 +16,8 @@
 //! `δ(s, h) = Σ_ji c_ji B((s − s_0)/Δ − i) B((h − h_0)/Δ − j)`, with the spacing
 //! `Δ = perimeter/columns`, the columns i periodic, and rows j from `first_row` on, row by row in
 //! `coefficients_m` ([`tunnelstitch_geometry::surface::RadialField`]). `sigma_m` has 1-σ of δ at
-//! each node; it is optional.
+//! each node, `deviation_sigma_m` that of δ less the best-fit circle of its row (of δ itself if the
+//! section is no circle), null where the frames do not determine it; both are optional.
 //!
 //! `bend`, optional as well, is a constant curvature of a tunnel that was planned straight
 //! ([`tunnelstitch_geometry::surface::Bend`]); its wall is displaced from there.
@@ -51,6 +53,10 @@ pub struct ShapeFile {
     /// 1-σ of δ at each node, metres; empty if unknown.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sigma_m: Vec<f64>,
+    /// 1-σ of the deviation from the best-fit circle of its row at each node, metres; None where
+    /// the frames do not determine it. Empty if unknown.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub deviation_sigma_m: Vec<Option<f64>>,
     /// A curvature of the tunnel that is not planned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bend: Option<Bend>,
@@ -71,7 +77,16 @@ impl ShapeFile {
             first_row: field.rows().start,
             coefficients_m: field.coefficients_m().to_vec(),
             sigma_m,
+            deviation_sigma_m: Vec::new(),
             bend: None,
+        }
+    }
+
+    /// The file with 1-σ of the deviation at each node, metres.
+    pub fn with_deviation_sigma_m(self, deviation_sigma_m: Vec<Option<f64>>) -> Self {
+        Self {
+            deviation_sigma_m,
+            ..self
         }
     }
 
@@ -90,6 +105,7 @@ impl ShapeFile {
             first_row: 0,
             coefficients_m: Vec::new(),
             sigma_m: Vec::new(),
+            deviation_sigma_m: Vec::new(),
             bend: Some(bend),
         }
     }
@@ -176,12 +192,17 @@ impl ShapeFile {
                 self.columns
             ));
         }
-        if !self.sigma_m.is_empty() && self.sigma_m.len() != self.coefficients_m.len() {
-            return Err(format!(
-                "sigma_m has {} values for {} coefficients",
-                self.sigma_m.len(),
-                self.coefficients_m.len()
-            ));
+        let lengths = [
+            ("sigma_m", self.sigma_m.len()),
+            ("deviation_sigma_m", self.deviation_sigma_m.len()),
+        ];
+        for (name, length) in lengths {
+            if length != 0 && length != self.coefficients_m.len() {
+                return Err(format!(
+                    "{name} has {length} values for {} coefficients",
+                    self.coefficients_m.len()
+                ));
+            }
         }
         Ok(())
     }
@@ -208,10 +229,11 @@ mod tests {
             -2,
             (0..24).map(|k| 1e-3 / f64::from(k + 1)).collect(),
         );
-        ShapeFile {
-            bend: Some(BEND),
-            ..ShapeFile::new(&field, vec![1e-4; 24])
-        }
+        let mut deviations = vec![Some(1e-4); 24];
+        deviations[5] = None;
+        ShapeFile::new(&field, vec![1e-4; 24])
+            .with_deviation_sigma_m(deviations)
+            .with_bend(Some(BEND))
     }
 
     fn circle() -> Circle {
@@ -247,6 +269,7 @@ mod tests {
                 |f| f.bend.as_mut().unwrap().curvature_per_m[0] = 0.1,
                 "bend",
             ),
+            (|f| f.deviation_sigma_m.truncate(2), "deviation_sigma_m"),
         ];
         for (change, named) in changes {
             let mut file = file();

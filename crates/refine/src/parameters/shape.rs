@@ -159,6 +159,11 @@ impl ShapeModel {
         }
     }
 
+    /// Chainage between which the wall has a shape, metres.
+    pub fn extent_h_m(&self) -> [f64; 2] {
+        self.extent_h_m
+    }
+
     /// Distance of the nodes of a lattice, metres.
     pub fn spacing_m(&self, columns: usize) -> f64 {
         self.lattice(columns).spacing_m()

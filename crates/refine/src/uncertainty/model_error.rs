@@ -71,6 +71,9 @@ pub struct EstimateErrors {
     pub draws: ErrorDraws,
     /// The patches over which errors go together; None if all is noise.
     pub patches: Option<Patches>,
+    /// Draws of the errors by noise and prior together; None if `draws` has them, or if there is no
+    /// shape, which alone needs them.
+    noise: Option<ErrorDraws>,
 }
 
 /// Patches over which errors go together.
@@ -120,22 +123,26 @@ impl EstimateErrors {
         let Some(prior) = PriorRoot::of(pattern, &prior) else {
             return Ok(None);
         };
-        let draw = |scores: &PatchScores, posterior| {
+        let curvature = solution.record.curvature();
+        let draw = |scores: &PatchScores, posterior, curvature| {
             let system = System {
                 factor: &factor,
                 exposures: &exposures,
                 posterior,
                 scores,
                 prior: &prior,
-                curvature: solution.record.curvature(),
+                curvature,
             };
             system.draw(pattern.columns(), frames)
         };
         let mut scores = problem.patch_scores(&solution.unknowns)?;
+        let finest = scores.clone();
+        let mut finest_dispersion = None;
         let mut largest: Option<(ErrorDraws, Patches)> = None;
         for blocks in PATCH_BLOCKS {
-            let draws = draw(&scores, posterior);
+            let draws = draw(&scores, posterior, curvature);
             let dispersion = draws.quadratic / of_noise.determined;
+            finest_dispersion.get_or_insert(dispersion);
             let before = largest.as_ref().map_or(0.0, |l| l.1.dispersion);
             let by_chance = of_noise.pixel_dispersion * chance_factor(scores.len(), alpha);
             if dispersion > before.max(by_chance) {
@@ -147,12 +154,28 @@ impl EstimateErrors {
             Some((draws, patches)) => Self {
                 draws,
                 patches: Some(patches),
+                noise: None,
             },
-            None => Self {
-                draws: draw(&PatchScores::default(), None),
-                patches: None,
-            },
+            None => {
+                // Scores of the smallest patches, with the dispersion of single blocks.
+                let share = finest_dispersion.map_or(1.0, |c| c / of_noise.pixel_dispersion);
+                let scale = if share > 0.0 { share.sqrt() } else { 1.0 };
+                let has_shape = pattern.columns() > frames;
+                Self {
+                    draws: draw(&PatchScores::default(), None, curvature),
+                    patches: None,
+                    noise: has_shape.then(|| draw(&finest, posterior, curvature * scale)),
+                }
+            }
         }))
+    }
+
+    /// Draws of all errors, by pixels and prior; None if there is no shape and all is noise.
+    pub fn of_all(&self) -> Option<&ErrorDraws> {
+        match self.patches {
+            Some(_) => Some(&self.draws),
+            None => self.noise.as_ref(),
+        }
     }
 }
 
@@ -165,6 +188,16 @@ fn chance_factor(patches: usize, alpha: f64) -> f64 {
 }
 
 impl ErrorDraws {
+    /// Number of draws.
+    pub fn count(&self) -> usize {
+        self.shared.len()
+    }
+
+    /// One draw of the errors of the slots from `first` on.
+    pub fn of_slots(&self, first: usize, draw: usize) -> Vec<FrameStep> {
+        self.slots[first..].iter().map(|slot| slot[draw]).collect()
+    }
+
     /// Covariance of the errors of two slots.
     pub fn of_pair(&self, j: usize, k: usize) -> Block {
         let products = self.slots[j].iter().zip(&self.slots[k]);

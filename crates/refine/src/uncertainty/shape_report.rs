@@ -15,6 +15,15 @@ pub struct EstimatedShape {
     /// 1-σ of the displacement at each node of the field, in the order of its coefficients, metres;
     /// NaN where it is unknown.
     pub sigma_m: Vec<f64>,
+    /// Draws of the displacement's errors, by pixels, prior, lens and model errors, with all their
+    /// correlations; none if they are unknown. With 128 of them a 1-σ of any figure that is
+    /// computed from the field is known to 6 %.
+    pub error_draws: Vec<RadialField>,
+    /// 1-σ of the displacement by its prior, before the frames were seen, metres: root mean square
+    /// around the tunnel; 0 if nothing was estimated.
+    pub prior_sigma_m: f64,
+    /// Chainage between which the frames see the wall, metres; None if nothing was estimated.
+    pub extent_h_m: Option<[f64; 2]>,
 }
 
 /// The shape in the report.
@@ -64,16 +73,65 @@ impl EstimatedShape {
                     sigma_at(model, covariance, first_slot, node)
                 })
         });
-        Some(Self { field, sigma_m })
+        Some(Self {
+            sigma_m,
+            error_draws: shape
+                .zip(covariance)
+                .map_or_else(Vec::new, |(shape, covariance)| {
+                    error_draws(shape, covariance, first_slot)
+                }),
+            prior_sigma_m: model.map_or(0.0, |model| prior_sigma_m(model, &field)),
+            extent_h_m: model.map(ShapeModel::extent_h_m),
+            field,
+        })
     }
 
     /// The shape moved on the unrolled wall and scaled with all of it.
     pub fn moved(self, by: WallPoint, scale: f64) -> Self {
+        let moved = |field: RadialField| field.moved(by).scaled(scale);
         Self {
-            field: self.field.moved(by).scaled(scale),
+            field: moved(self.field),
             sigma_m: self.sigma_m.iter().map(|sigma_m| sigma_m * scale).collect(),
+            error_draws: self.error_draws.into_iter().map(moved).collect(),
+            prior_sigma_m: self.prior_sigma_m * scale,
+            extent_h_m: self
+                .extent_h_m
+                .map(|h_m| h_m.map(|h_m| (h_m + by.h_m) * scale)),
         }
     }
+}
+
+/// Draws of the errors of a shape, as fields.
+fn error_draws(shape: &Shape, covariance: &TotalCovariance, first_slot: usize) -> Vec<RadialField> {
+    let errors = covariance.errors.as_ref();
+    let Some(draws) = errors.and_then(|errors| errors.of_all()) else {
+        return Vec::new();
+    };
+    let field = |draw: usize| {
+        let drawn = Shape {
+            model: shape.model.clone(),
+            coefficients: draws.of_slots(first_slot, draw),
+        };
+        drawn.field()
+    };
+    let fields = (0..draws.count()).par_map(field);
+    fields.into_iter().flatten().collect()
+}
+
+/// 1-σ of the displacement by the prior alone, root mean square over a row in the middle of the
+/// field, metres.
+fn prior_sigma_m(model: &ShapeModel, field: &RadialField) -> f64 {
+    let sigmas_m = model.block_sigmas_m();
+    let (rows, lattice) = (field.rows(), field.lattice());
+    let variance = |column: usize| -> f64 {
+        let wall = lattice.node((rows.start + rows.end) / 2, column);
+        let functions = model.functions_at(wall).into_iter();
+        functions
+            .map(|f| (f.value * sigmas_m[f.block]).powi(2))
+            .sum()
+    };
+    let sum: f64 = (0..lattice.columns).map(variance).sum();
+    (sum / lattice.columns as f64).sqrt()
 }
 
 /// 1-σ of the displacement at a point of the wall, metres.

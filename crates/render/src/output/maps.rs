@@ -1,4 +1,4 @@
-//! Maps of resolution and uncertainty over the panorama.
+//! Maps of resolution, uncertainty and properties of the wall over the panorama.
 
 use super::raster_target::georeference;
 use crate::layout::canvas::{Canvas, Layout};
@@ -12,7 +12,7 @@ use tunnelstitch_core::raster::{
 };
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-use tunnelstitch_geometry::surface::{Surface, wall_jacobian};
+use tunnelstitch_geometry::surface::{Surface, WallPoint, wall_jacobian};
 
 /// Map of one number for each node of a grid; NaN where there is none.
 #[derive(Clone, Debug)]
@@ -64,6 +64,18 @@ impl Map {
             (1e3 * largest.max(0.0).sqrt()) as f32
         };
         Self::of(surface, camera, placements, grid, labels, sigma_mm)
+    }
+
+    /// Maps a property of the wall by its value at a point.
+    pub fn of_wall(grid: &Canvas, value: impl Fn(WallPoint) -> f32 + Sync) -> Self {
+        let rows = (0..grid.rows as usize).par_map(|row| {
+            let at = |column: u32| value(grid.wall(column, row as u32));
+            (0..grid.columns).map(at).collect::<Vec<f32>>()
+        });
+        Self {
+            grid: *grid,
+            values: rows.concat(),
+        }
     }
 
     fn of(

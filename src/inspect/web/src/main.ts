@@ -10,6 +10,7 @@ import { wirePad } from "./pad";
 import { Overlay, type Shape } from "./overlay";
 import { Panel, valueOf } from "./panel";
 import { type Capabilities, type Tunnel, type WallPoints, read } from "./tunnel";
+import { Values } from "./values";
 import { Walk } from "./walk";
 import { Wall, type WallPlace } from "./wall";
 
@@ -31,6 +32,9 @@ class Page {
   private readonly map: WallMap;
   private readonly overlay: Overlay;
   private readonly store: Store;
+  private readonly values: Values;
+  /** Pointer in the view, normalised device coordinates. */
+  private pointer: [number, number] = [0, 0];
   private cameras: Group | null = null;
   private marks: Mark[] = [];
   private chosen = "";
@@ -51,6 +55,7 @@ class Page {
     this.layers = new Layers(tunnel, this.camera, this.renderer);
     this.map = new WallMap(byId("map"), byId("whole"), this.wall);
     this.overlay = new Overlay(byId("overlay"), this.wall, this.camera);
+    this.values = new Values(tunnel);
     this.store = capabilities.marks ? new ServerStore() : new LocalStore();
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
@@ -76,6 +81,10 @@ class Page {
     this.layers.onProblem = (what) => this.panel.problem(what);
     this.walk.onClick = (x, y) => this.click(x, y);
     this.map.onJump = (place) => this.jump(place);
+    this.view.addEventListener("pointermove", (event) => {
+      this.pointer = document.pointerLockElement ? [0, 0] : this.deviceOf(event.offsetX, event.offsetY);
+      this.showValue();
+    });
     window.addEventListener("hashchange", () => this.goTo(location.hash));
     window.addEventListener("keydown", (event) => this.key(event));
     for (const button of document.querySelectorAll<HTMLButtonElement>("[data-tool]")) {
@@ -128,6 +137,7 @@ class Page {
     const seen = this.layers.pick(0, 0);
     const at = seen ? `; looking at ${this.where(seen)}` : "";
     byId("place").textContent = `at ${h.toFixed(2)} m, ${this.walk.clearance.toFixed(2)} m from the wall${at}`;
+    this.showValue();
     const pins = this.marks.map((mark) => ({ place: placesOf(mark)[0], colour: "#ff5d5d" }));
     this.map.move(h, seen, pins);
     const { triangles } = this.renderer.info.render;
@@ -137,6 +147,16 @@ class Page {
       const hash = `#h=${seen.h.toFixed(2)}&clock=${this.clock(seen)}`;
       if (hash !== location.hash) history.replaceState(null, "", hash);
     }
+  }
+
+  /** Normalised device coordinates of a point of the view, CSS pixels. */
+  private deviceOf(x: number, y: number): [number, number] {
+    return [(x / this.view.clientWidth) * 2 - 1, 1 - (y / this.view.clientHeight) * 2];
+  }
+
+  /** Shows the value of the layer under the pointer, if it has values. */
+  private showValue(): void {
+    if (this.layers.current.values) this.values.point(this.layers.pick(...this.pointer));
   }
 
   private clock(place: WallPlace): string {
@@ -170,6 +190,7 @@ class Page {
   private showLayer(name: string): void {
     this.layers.show(name);
     this.map.show(this.layers.current);
+    this.values.show(this.layers.current).catch((error: Error) => this.panel.problem(error.message));
     for (const button of document.querySelectorAll<HTMLElement>("[data-layer]")) press(button, button.dataset.layer === name);
     if (this.cameras) {
       this.toggleCameras();
@@ -226,7 +247,7 @@ class Page {
 
   private click(x: number, y: number): void {
     if (this.tool === "look") return;
-    const place = this.layers.pick((x / this.view.clientWidth) * 2 - 1, 1 - (y / this.view.clientHeight) * 2);
+    const place = this.layers.pick(...this.deviceOf(x, y));
     if (!place) return this.panel.say("Nothing there", "No wall was hit.");
     if (this.tool === "frames") {
       this.measured = { places: [place], label: "", chosen: true };

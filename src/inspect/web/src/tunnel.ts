@@ -16,6 +16,15 @@ export interface Layer {
   map: MapImages;
   /** Camera-to-world poses: position (m) and quaternion x, y, z, w. */
   poses: [number, number, number, number, number, number, number][];
+  /** Values that the layer shows besides the picture. */
+  values?: LayerValues;
+}
+
+export interface LayerValues {
+  file: string;
+  range_mm: [number, number];
+  /** The colours, as a CSS gradient. */
+  gradient: string;
 }
 
 export interface Tunnel {

@@ -1,4 +1,5 @@
-//! Maps beside a panorama: coverage, frames, resolution, uncertainty, preview and gaps.
+//! Maps beside a panorama: coverage, frames, resolution, uncertainty, deformation, preview and
+//! gaps.
 
 use super::state::MapsState;
 use crate::compositing::band::Target;
@@ -17,16 +18,31 @@ use tunnelstitch_core::frames::{PictureFormat, write_picture};
 use tunnelstitch_core::persist::atomic::{self, WriteError};
 use tunnelstitch_core::raster::RasterError;
 use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::WallPoint;
 
 pub(super) const COVERAGE: &str = "coverage.tif";
 pub(super) const FRAMES: &str = "frames.tif";
 const RESOLUTION: &str = "resolution.tif";
 const UNCERTAINTY: &str = "uncertainty.tif";
+const DEFORMATION: &str = "deformation.tif";
+const DEFORMATION_SIGMA: &str = "deformation_sigma.tif";
 const PREVIEW: &str = "preview.png";
 const GAPS: &str = "gaps.csv";
 
 /// Names of all maps.
-pub(super) const MAP_FILES: [&str; 6] = [COVERAGE, FRAMES, RESOLUTION, UNCERTAINTY, PREVIEW, GAPS];
+pub(super) const MAP_FILES: [&str; 8] = [
+    COVERAGE,
+    FRAMES,
+    RESOLUTION,
+    UNCERTAINTY,
+    DEFORMATION,
+    DEFORMATION_SIGMA,
+    PREVIEW,
+    GAPS,
+];
+
+/// Deformation of the wall at a point and its 1-σ, millimetres; NaN where they are not known.
+pub type DeformationAt<'d> = dyn Fn(WallPoint) -> [f32; 2] + Sync + 'd;
 
 /// Maps that are being written.
 pub(super) struct MapFiles {
@@ -65,6 +81,7 @@ impl MapFiles {
         gaps: &[Gap],
         camera: &Camera,
         covariances: Option<&[Matrix6<f64>]>,
+        deformation: Option<&DeformationAt>,
     ) -> Result<(), RenderError> {
         let (surface, placements) = (plan.surface(), plan.placements());
         self.coverage.finish()?;
@@ -80,6 +97,15 @@ impl MapFiles {
         } else {
             // A map of an earlier panorama would belong to other poses.
             atomic::remove_file(&uncertainty).map_err(RasterError::from)?;
+        }
+        for (which, name) in [DEFORMATION, DEFORMATION_SIGMA].into_iter().enumerate() {
+            let path = self.folder.join(name);
+            if let Some(deformation) = deformation {
+                let map = Map::of_wall(&grid, |wall| deformation(wall)[which]);
+                map.write(&path, layout)?;
+            } else {
+                atomic::remove_file(&path).map_err(RasterError::from)?;
+            }
         }
         let preview = DynamicImage::from(self.preview.picture(surface, layout, 0.0));
         write_picture(&self.folder.join(PREVIEW), &preview, PictureFormat::Png)

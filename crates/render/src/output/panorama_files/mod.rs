@@ -17,4 +17,5 @@ mod options;
 mod state;
 
 pub use files::{CheckpointedFiles, PanoramaFiles};
+pub use maps::DeformationAt;
 pub use options::PanoramaFileOptions;
