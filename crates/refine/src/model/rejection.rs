@@ -50,11 +50,6 @@ pub enum RejectionReason {
         /// Number of frames of that group.
         frames: usize,
     },
-    /// The last solve did not converge.
-    NotConverged {
-        /// The next step, pixels on the wall.
-        step_px: f64,
-    },
     /// Too little overlap with other frames.
     NoOverlap {
         /// Share of its pixels that others show, 0 to 1.
@@ -158,10 +153,6 @@ impl fmt::Display for RejectionReason {
                 f,
                 "it is one of {frames} frames that agree with each other, \
                  but no reliable pair connects them to the others"
-            ),
-            Self::NotConverged { step_px } => write!(
-                f,
-                "its pose did not converge: the next step would move it by {step_px:.1} px"
             ),
             Self::NoOverlap { share } if *share == 0.0 => {
                 write!(f, "it overlaps no other frame on the wall")

@@ -24,7 +24,7 @@
 //! MacKay, "Bayesian interpolation", Neural Computation 4(3), 1992 (strengths by evidence).
 
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -34,6 +34,8 @@ use tunnelstitch_geometry::surface::{RadialField, SplineLattice, WallPoint};
 const BLOCK_FUNCTIONS: usize = FRAME_PARAMETERS;
 /// Columns of the coarsest lattice.
 const MIN_COLUMNS: usize = BLOCK_FUNCTIONS;
+/// Harmonics of a section that are hardly seen: its mean, cos θ and sin θ.
+const WEAK_HARMONICS: usize = 3;
 /// Order m of the first harmonic. Those of order 0 and 1 are the radius and the position of the
 /// axis.
 const FIRST_HARMONIC: usize = 2;
@@ -63,6 +65,48 @@ impl Functions {
         match *self {
             Self::Harmonics => 1,
             Self::Lattice { columns, rows, .. } => rows * columns / BLOCK_FUNCTIONS,
+        }
+    }
+
+    /// Number of coefficients that [`Functions::retain_deformation`] leaves.
+    pub fn deformations(&self) -> usize {
+        let all = BLOCK_FUNCTIONS * self.blocks();
+        match *self {
+            Self::Harmonics => all,
+            Self::Lattice { rows, .. } => all - WEAK_HARMONICS * rows,
+        }
+    }
+
+    /// Removes mean, cos θ and sin θ from every row of coefficients, given as blocks with a vector
+    /// in each column: as radius and position of the axis, these are hardly seen.
+    pub fn retain_deformation<const C: usize>(
+        &self,
+        blocks: &mut [SMatrix<f64, BLOCK_FUNCTIONS, C>],
+    ) {
+        let Self::Lattice { columns, .. } = *self else {
+            return;
+        };
+        let weight = |harmonic: usize, column: usize| {
+            let theta = TAU * column as f64 / columns as f64;
+            match harmonic {
+                0 => (1.0 / columns as f64).sqrt(),
+                1 => (2.0 / columns as f64).sqrt() * theta.cos(),
+                _ => (2.0 / columns as f64).sqrt() * theta.sin(),
+            }
+        };
+        for row in blocks.chunks_mut(columns / BLOCK_FUNCTIONS) {
+            for harmonic in 0..WEAK_HARMONICS {
+                let weights = |block: usize| {
+                    let first = block * BLOCK_FUNCTIONS;
+                    ShapeStep::from_fn(|k, _| weight(harmonic, first + k))
+                };
+                let products = row.iter().enumerate();
+                let products = products.map(|(k, block)| weights(k).transpose() * block);
+                let amplitude: SMatrix<f64, 1, C> = products.sum();
+                for (k, block) in row.iter_mut().enumerate() {
+                    *block -= weights(k) * amplitude;
+                }
+            }
         }
     }
 }
@@ -379,6 +423,28 @@ mod tests {
         functions
             .map(|f| f.value * shape.coefficients[f.block][f.component])
             .sum()
+    }
+
+    #[test]
+    fn a_deformation_has_neither_mean_nor_first_harmonic() {
+        let functions = Functions::Lattice {
+            columns: 16,
+            first_row: 0,
+            rows: 2,
+        };
+        let values = |block: usize, k: usize| {
+            let theta = TAU * (8 * (block % 2) + k) as f64 / 16.0;
+            (2.0 + theta.cos() - 3.0 * theta.sin(), (2.0 * theta).cos())
+        };
+        let of = |weak: f64, block: usize| {
+            ShapeStep::from_fn(|k, _| weak * values(block, k).0 + values(block, k).1)
+        };
+        let mut blocks: Vec<ShapeStep> = (0..4).map(|block| of(1.0, block)).collect();
+        functions.retain_deformation(&mut blocks);
+        for (k, block) in blocks.iter().enumerate() {
+            assert!((block - of(0.0, k)).norm() < 1e-12);
+        }
+        assert_eq!(functions.deformations(), 32 - 6);
     }
 
     #[test]

@@ -12,7 +12,9 @@
 //!
 //! `σ_k² = |ĉ_k|²/γ_k`,  `γ_k = n_k − tr(A⁻¹)_kk/σ_k²`,
 //!
-//! γ_k being the number of coefficients that the pixels determine. Iterating this goes there, with
+//! γ_k being the number of coefficients that the pixels determine. Both count without mean, cos θ
+//! and sin θ of the section ([`Functions::retain_deformation`]): as these are hardly seen, the least
+//! error of the model moves them far, and they would raise the strength of the rest. Iterating this goes there, with
 //! one factorisation a step and no pixel read. Traces come from random signs z: the mean of
 //! `zᵀ A⁻¹ z`.
 //!
@@ -33,7 +35,7 @@ use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
 use crate::model::significance::normal_quantile;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
-use crate::parameters::shape::{Shape, ShapeModel};
+use crate::parameters::shape::{Functions, Shape, ShapeModel, ShapeStep};
 use crate::solver::gauss_newton::Solution;
 use nalgebra::SMatrix;
 use rand::{Rng, SeedableRng};
@@ -220,14 +222,17 @@ impl<'s> ShapeEquations<'s> {
                 if dropped[k] {
                     continue;
                 }
-                let n = (slots.len() * FRAME_PARAMETERS) as f64;
-                let determined = n - self.trace(&minimum, &slots)? / sigmas_m[k].powi(2);
-                let square: f64 = slots
-                    .map(|slot| {
-                        let before = &self.shape.coefficients[slot - self.first_slot];
-                        (before + minimum.step[slot]).norm_squared()
-                    })
-                    .sum();
+                let functions = &self.shape.model.scales[k].functions;
+                let n = functions.deformations() as f64;
+                let trace = self.trace(&minimum, &slots, functions)?;
+                let determined = n - trace / sigmas_m[k].powi(2);
+                let coefficient = |slot: usize| {
+                    let before = &self.shape.coefficients[slot - self.first_slot];
+                    before + minimum.step[slot]
+                };
+                let mut coefficients: Vec<ShapeStep> = slots.map(coefficient).collect();
+                functions.retain_deformation(&mut coefficients);
+                let square: f64 = coefficients.iter().map(|c| c.norm_squared()).sum();
                 let learned = (square / determined.max(f64::MIN_POSITIVE)).sqrt();
                 let factor = (learned.min(most_m) / sigmas_m[k])
                     .clamp(1.0 / MAX_STEP_FACTOR, MAX_STEP_FACTOR);
@@ -242,13 +247,14 @@ impl<'s> ShapeEquations<'s> {
         Some(minimum)
     }
 
-    /// `tr(A⁻¹)` over some slots.
-    fn trace(&self, minimum: &Minimum, slots: &Range<usize>) -> Option<f64> {
+    /// `tr(P A⁻¹ P)` over some slots, P the projection [`Functions::retain_deformation`].
+    fn trace(&self, minimum: &Minimum, slots: &Range<usize>, functions: &Functions) -> Option<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(slots.start as u64);
         let mut z = vec![SMatrix::<f64, FRAME_PARAMETERS, PROBES>::zeros(); self.pattern.columns()];
         for block in &mut z[slots.clone()] {
             *block = SMatrix::from_fn(|_, _| if rng.random() { 1.0 } else { -1.0 });
         }
+        functions.retain_deformation(&mut z[slots.clone()]);
         let solved = minimum.factor.solve(&z);
         let products = z.iter().zip(&solved);
         let mut trace: f64 = products.map(|(z, s)| z.component_mul(s).sum()).sum();
@@ -309,7 +315,6 @@ impl LearnedShape<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::shape::ShapeStep;
     use rand_distr::{Distribution, StandardNormal};
     use tunnelstitch_geometry::surface::WallPoint;
 

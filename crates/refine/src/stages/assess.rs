@@ -1,7 +1,6 @@
 //! Stage: states the uncertainty and the verdict of every frame, and writes the report.
 
 use crate::error::RefineError;
-use crate::linear::sparse_cholesky::FactorError;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
@@ -47,9 +46,8 @@ pub fn run<'a>(
         stopping,
     } = last;
     let sigmas = frame_sigmas(&context, &state.frames, &uncertainty);
-    let steps_px = steps_left(&solution).unwrap_or_else(|_| vec![0.0; setup.count()]);
     let mut rejections = state.frames.rejections.clone();
-    judge(setup, &solution, &sigmas, &steps_px, &mut rejections);
+    judge(setup, &solution, &sigmas, &mut rejections);
     let calibration = setup.calibration_at(state);
     let datum = calibration.datum(&context.kappa);
     let shape = EstimatedShape::new(
@@ -155,7 +153,6 @@ fn judge(
     setup: &Setup,
     solution: &Solution,
     sigmas: &[FrameSigma],
-    steps_px: &[f64],
     rejections: &mut [Option<RejectionReason>],
 ) {
     let camera = &setup.input.camera;
@@ -167,7 +164,6 @@ fn judge(
             contribution: &solution.linearisation.frames[k],
             all_pixels,
             sigma: sigmas[k],
-            step_px: steps_px[k],
         };
         *rejection = evidence.judge(setup.options);
     }
@@ -212,24 +208,6 @@ fn report_calibration(
             setup.input.nominal_radius_m,
         )
     })
-}
-
-/// Movement of each frame, pixels on the wall, in the undamped step that is left where the solve
-/// ended for want of iterations or of descent.
-///
-/// # Errors
-/// [`ProblemError::Factor`].
-fn steps_left(solution: &Solution) -> Result<Vec<f64>, ProblemError> {
-    let problem = &solution.problem;
-    let linearisation = &solution.linearisation;
-    let factor = problem
-        .symbolic()
-        .factorise(problem.pattern(), &linearisation.normal, 0.0)
-        .map_err(|source| problem.factor_error(source))?;
-    let (step, shared) = linearisation
-        .step(&factor, 0.0, problem.tested())
-        .ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))?;
-    Ok(problem.wall_step_px(&solution.unknowns.frames, &step, &shared))
 }
 
 /// Root mean square residual of a frame, grey levels.

@@ -48,7 +48,7 @@ use crate::solver::gauss_newton::Solution;
 use crate::uncertainty::covariance::{NoiseCovariance, exposures_alone};
 use crate::uncertainty::observability::Posterior;
 use crate::uncertainty::total_covariance::PointJacobians;
-use nalgebra::{SMatrix, Vector2};
+use nalgebra::SMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -208,10 +208,8 @@ impl ErrorDraws {
     /// Mean square of the errors of a point of the wall, m².
     pub fn mean_square(&self, point: &PointJacobians) -> f64 {
         let square = |draw: usize| {
-            let of_slots = (point.slots.iter())
-                .map(|(slot, jacobian)| jacobian * self.slots[*slot][draw])
-                .sum::<Vector2<f64>>();
-            (of_slots + point.shared * self.shared[draw]).norm_squared()
+            let moved = point.moved(|slot| self.slots[slot][draw], &self.shared[draw]);
+            moved.norm_squared()
         };
         let draws = self.shared.len();
         (0..draws).map(square).sum::<f64>() / draws as f64

@@ -2,11 +2,12 @@
 
 use crate::linear::bordered_system::SharedBlock;
 use crate::linear::normal_equations::Pattern;
+use crate::linear::sparse_cholesky::FactorError;
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
-use crate::parameters::calibration::{Calibration, SHARED_PARAMETERS};
-use crate::parameters::frame_estimate::FrameEstimate;
+use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
+use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::MAX_MISFIT_SHARE;
 use crate::uncertainty::covariance::{Covariances, compute_covariances};
@@ -75,6 +76,7 @@ impl SolutionUncertainty {
                 Some(TotalCovariance {
                     of_noise,
                     errors,
+                    left: step_left(solution)?,
                     shared: of_shared.map(|(posterior, shared)| (posterior.w.clone(), shared)),
                 })
             }
@@ -175,6 +177,17 @@ impl SolutionUncertainty {
         }
         posterior.find_unobservable(calibration)
     }
+}
+
+/// The undamped step of all slots and of the shared parameters where the solve ended.
+fn step_left(solution: &Solution) -> Result<(Vec<FrameStep>, Kappa), ProblemError> {
+    let (problem, at) = (&solution.problem, &solution.linearisation);
+    let factor = problem
+        .symbolic()
+        .factorise(problem.pattern(), &at.normal, 0.0);
+    let factor = factor.map_err(|source| problem.factor_error(source))?;
+    let step = at.step(&factor, 0.0, problem.tested());
+    step.ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))
 }
 
 /// Of every frame, those that see part of the same wall.

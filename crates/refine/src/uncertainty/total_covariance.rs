@@ -1,9 +1,10 @@
-//! The covariance of all errors of an estimate: noise, prior, model errors, shared parameters.
+//! The covariance of all errors of an estimate: noise, prior, model errors, shared parameters, and
+//! what is left of the solve.
 
 use crate::linear::bordered_system::{BorderBlock, SharedBlock};
 use crate::linear::normal_equations::Block;
-use crate::parameters::calibration::SHARED_PARAMETERS;
-use crate::parameters::frame_estimate::FRAME_PARAMETERS;
+use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::parameters::shape::{FunctionValue, ShapeStep};
 use crate::uncertainty::covariance::{Covariances, NoiseCovariance};
 use crate::uncertainty::model_error::EstimateErrors;
@@ -18,6 +19,9 @@ pub struct TotalCovariance {
     pub errors: Option<EstimateErrors>,
     /// W of all slots and `Σ_κ`, where the shared parameters were estimated.
     pub shared: Option<(Vec<BorderBlock>, SharedBlock)>,
+    /// The undamped step of slots and shared parameters where the solve ended. Whether it would be
+    /// right is not known, so it counts as an error.
+    pub left: (Vec<FrameStep>, Kappa),
 }
 
 /// Derivative of a point of the wall, `(s, h)`, by the unknowns of one slot.
@@ -42,6 +46,13 @@ impl PointJacobians {
         let mut target = pose.fixed_columns_mut::<6>(0);
         target += pixel.pose * share;
         self.shared += pixel.shared * share;
+    }
+
+    /// Movement of the point by steps of the slots and of the shared parameters.
+    pub fn moved(&self, step: impl Fn(usize) -> FrameStep, shared: &Kappa) -> Vector2<f64> {
+        let of_slots = self.slots.iter();
+        let of_slots = of_slots.map(|(slot, jacobian)| jacobian * step(*slot));
+        of_slots.sum::<Vector2<f64>>() + self.shared * shared
     }
 
     /// Adds the derivatives by the shape: `τ φᵀ`; `first`: slot of the shape's first block.
@@ -71,12 +82,15 @@ impl TotalCovariance {
         // What has nothing in common has no covariance, whatever draws say.
         let inverse = self.of_noise.inverse.block(j, k)?;
         let c = self.of_noise.pixel_dispersion;
+        let left = self.left.0[j] * self.left.0[k].transpose();
         let total = match &self.errors {
             // Draws of patches include those of the shared parameters.
-            Some(errors) if errors.patches.is_some() => return Some(errors.draws.of_pair(j, k)),
+            Some(errors) if errors.patches.is_some() => {
+                return Some(errors.draws.of_pair(j, k) + left);
+            }
             Some(errors) => inverse * c + errors.draws.of_pair(j, k) * (1.0 - c),
             None => inverse * c,
-        };
+        } + left;
         Some(match &self.shared {
             Some((w, covariance)) => total + w[j] * covariance * w[k].transpose(),
             None => total,
@@ -102,10 +116,15 @@ impl TotalCovariance {
     /// As slots move by `−W κ` with κ, what κ alone does is `K Σ_κ Kᵀ`, `K = C − Σ_j J_j W_j`.
     pub fn variance(&self, point: &PointJacobians) -> f64 {
         let PointJacobians { slots, shared } = point;
+        let of_left = point
+            .moved(|slot| self.left.0[slot], &self.left.1)
+            .norm_squared();
         let c = self.of_noise.pixel_dispersion;
         let of_prior = match &self.errors {
             // Draws of patches include those of the shared parameters.
-            Some(errors) if errors.patches.is_some() => return errors.draws.mean_square(point),
+            Some(errors) if errors.patches.is_some() => {
+                return errors.draws.mean_square(point) + of_left;
+            }
             Some(errors) => (1.0 - c) * errors.draws.mean_square(point),
             None => 0.0,
         };
@@ -123,7 +142,7 @@ impl TotalCovariance {
             let left = shared - moved;
             (left * covariance).dot(&left)
         });
-        c * of_pixels + of_prior + of_shared
+        c * of_pixels + of_prior + of_shared + of_left
     }
 
     /// Variance of the wall's displacement where the shape has the given `functions`, m²; `first`:

@@ -23,8 +23,6 @@ pub struct FrameEvidence<'e> {
     pub all_pixels: f64,
     /// 1-σ of its pose, model errors included.
     pub sigma: FrameSigma,
-    /// Step that is left, pixels on the wall.
-    pub step_px: f64,
 }
 
 impl FrameEvidence<'_> {
@@ -35,7 +33,6 @@ impl FrameEvidence<'_> {
             contribution,
             all_pixels,
             sigma,
-            step_px,
         } = self;
         let has_overlap = contribution.pixels >= MIN_PIXEL_SHARE * all_pixels;
         let no_overlap = (!has_overlap).then(|| RejectionReason::NoOverlap {
@@ -46,14 +43,10 @@ impl FrameEvidence<'_> {
         let uncertain = is_uncertain.then_some(RejectionReason::Uncertain {
             wall_px: sigma.registration_px,
         });
-        // A pose a step of 2 σ away from the minimum is not within its σ.
-        let is_moving = step_px > options.max_sigma_px.max(2.0 * sigma.wall_px);
-        let not_converged = is_moving.then_some(RejectionReason::NotConverged { step_px });
         rejection
             .or(no_overlap)
             .or_else(|| find_disagreement(contribution))
             .or(uncertain)
-            .or(not_converged)
     }
 }
 
@@ -61,7 +54,7 @@ impl FrameEvidence<'_> {
 mod tests {
     use super::*;
 
-    fn judge(registration_px: f64, inliers: f64, step_px: f64) -> Option<RejectionReason> {
+    fn judge(registration_px: f64, inliers: f64) -> Option<RejectionReason> {
         let contribution = FrameContribution {
             samples: 100,
             pixels: 100.0,
@@ -80,21 +73,16 @@ mod tests {
             contribution: &contribution,
             all_pixels: 200.0,
             sigma,
-            step_px,
         };
         evidence.judge(&RefineOptions::default())
     }
 
     #[test]
     fn the_first_reason_counts() {
-        use RejectionReason::{Disagrees, NotConverged, Uncertain};
-        assert_eq!(judge(0.02, 95.0, 0.01), None);
-        assert!(matches!(judge(0.3, 95.0, 0.01), Some(Uncertain { .. })));
-        assert!(matches!(
-            judge(f64::NAN, 95.0, 0.01),
-            Some(Uncertain { .. })
-        ));
-        assert!(matches!(judge(0.3, 20.0, 0.01), Some(Disagrees { .. })));
-        assert!(matches!(judge(0.02, 95.0, 1.0), Some(NotConverged { .. })));
+        use RejectionReason::{Disagrees, Uncertain};
+        assert_eq!(judge(0.02, 95.0), None);
+        assert!(matches!(judge(0.3, 95.0), Some(Uncertain { .. })));
+        assert!(matches!(judge(f64::NAN, 95.0), Some(Uncertain { .. })));
+        assert!(matches!(judge(0.3, 20.0), Some(Disagrees { .. })));
     }
 }
