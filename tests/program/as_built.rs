@@ -95,6 +95,7 @@ fn lining() -> Scene {
         ovality_mm: 10.0,
         undulation_mm: 2.0,
         undulation_length_m: 1.5,
+        ..AsBuilt::default()
     };
     let options = SimulateOptions {
         frames: 2,
@@ -160,7 +161,8 @@ fn sections_are_those_of_the_lining_within_their_sigma() {
         .enumerate()
     {
         let largest = normalised.iter().map(|n| n[k].abs()).fold(0.0, f64::max);
-        assert!(largest < 3.0, "{figure}: {largest} σ, of {normalised:?}");
+        // Of 45 normal errors one is larger with the probability 10⁻³.
+        assert!(largest < 4.2, "{figure}: {largest} σ, of {normalised:?}");
     }
 }
 
@@ -272,4 +274,44 @@ fn many_points_are_located_at_once() {
     std::fs::write(&points, "frame,u\n3,10\n").unwrap();
     let message = fail(&[&arguments[..], &files].concat(), 3);
     assert!(message.contains("no column v"), "{message}");
+}
+
+/// A tunnel along an arc of 150 m of which the survey says that it is straight: the bend is found
+/// within 3 σ, no deformation is made of it, and pixels are located along the bend.
+#[test]
+fn a_bend_that_is_declared_straight_is_found() {
+    let dir = tempfile::tempdir().unwrap();
+    let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
+    let line = dir.path().join("arc.txt");
+    let radius_m = 150.0;
+    let point = |k: i32| {
+        let angle = 0.5 * f64::from(k) / radius_m;
+        let (x, y) = (radius_m * (1.0 - angle.cos()), radius_m * angle.sin());
+        format!("{x:.9} {y:.9} 0\n")
+    };
+    std::fs::write(&line, (-10..40).map(point).collect::<String>()).unwrap();
+    let options = "--frames 40 --size 200x150 --seed 5 --noise 1 --centreline";
+    let options = options.split(' ').chain([text(&line)]);
+    simulate(&survey, &options.collect::<Vec<_>>());
+    let toml = survey.join("survey.toml");
+    let declared = std::fs::read_to_string(&toml).unwrap();
+    let straight = declared.lines().filter(|l| !l.starts_with("centreline"));
+    std::fs::write(&toml, straight.collect::<Vec<_>>().join("\n")).unwrap();
+    let refine = ["refine", text(&survey), "--out", text(&out), "--quiet"];
+    succeed(&refine);
+    let report = json(&out.join("refine.json"));
+    assert_eq!(report["frames_on_prior"], 0);
+    assert_eq!(report["shape"]["scales"], serde_json::json!([]));
+    let number = |name: &str| report["bend"][name].as_f64().unwrap();
+    let sigma_m = number("radius_sigma_m");
+    assert!(sigma_m < 0.05 * radius_m, "{sigma_m}");
+    assert!((number("radius_m") - radius_m).abs() < 3.0 * sigma_m);
+    // What is found is used, and is where a second refinement starts.
+    let (poses, again) = (out.join("poses.tum"), dir.path().join("again"));
+    let locate = ["locate", text(&survey), "--poses", text(&poses)];
+    let said = succeed(&[&locate[..], &["--frame", "20,100,75"]].concat());
+    assert!(said.contains("chainage"), "{said}");
+    succeed(&["refine", text(&out), "--out", text(&again), "--quiet"]);
+    let [shape, kept] = [&out, &again].map(|folder| json(&folder.join("shape.json")));
+    assert_eq!(shape["bend"], kept["bend"]);
 }

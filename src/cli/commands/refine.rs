@@ -262,6 +262,13 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
         poses.display(),
         arguments.out.join(REFINEMENT_FILE).display()
     ));
+    if let Some(bend) = &report.bend {
+        terminal.say(format!(
+            "the tunnel bends towards {:.0}° with a radius of {:.0} ± {:.0} m (1-σ); poses and \
+             chainage are along the bend",
+            bend.towards_deg, bend.radius_m, bend.radius_sigma_m
+        ));
+    }
     let shape = report
         .shape
         .as_ref()

@@ -35,6 +35,7 @@
 //! associate = "time"          # or "name" (default if the file has names), or "order"
 //! time_tolerance_s = 0.01     # largest difference of times; the default
 //! interpolate = true          # by default the nearer pose is taken
+//! as_built = true             # not to be carried along the bend of shape_file
 //!
 //! [prior]                     # optional: noise of the initial poses
 //! model = "random-walk"       # or "independent"

@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn impossible_values_are_named() {
         type Change = fn(&mut ShapeFile);
-        let changes: [(Change, &str); 8] = [
+        let changes: [(Change, &str); 9] = [
             (|f| f.format = "x".to_owned(), "format"),
             (|f| f.perimeter_m = 17.0, "perimeter_m"),
             (|f| f.columns = 12, "columns"),

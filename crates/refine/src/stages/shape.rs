@@ -30,6 +30,9 @@ const MAX_PRIOR_SIGMAS: f64 = 10.0;
 /// Largest strength of a scale, 1-σ of the prior. The residuals of a wall that is not smooth would
 /// be explained by shapes that pixels hardly see.
 const MAX_STRENGTH_SIGMAS: f64 = 3.0;
+/// Rate at which a scale of no use is kept until the last solve, which sees more than the ones
+/// before.
+const KEPT_RATE: f64 = 0.3;
 /// Strength of a finer lattice over that of the one before, before it is learned.
 const FINER_STRENGTH: f64 = 0.5;
 /// Factor by which a strength may change without a new solve; the estimate hardly depends on it.
@@ -99,10 +102,14 @@ fn fix_shared(setup: &Setup, state: &mut PipelineState) {
 
 /// Learns the strengths of the shape at a full-size solution, and whether the lens differs from the
 /// given one, and the tunnel from a straight one. Returns true if that changes anything; the state
-/// is then where the new solve should end.
-pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution) -> bool {
+/// is then where the new solve should end. `is_last`: no other solve is certain to follow.
+pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_last: bool) -> bool {
     let most_m = MAX_STRENGTH_SIGMAS * setup.shape_sigma_m;
-    let Some(learned) = learn_shape(solution, most_m, setup.options.false_alarm_rate) else {
+    let alpha = match is_last {
+        true => setup.options.false_alarm_rate,
+        false => KEPT_RATE,
+    };
+    let Some(learned) = learn_shape(solution, most_m, alpha) else {
         return false;
     };
     let kappa = solution.linearised_at.kappa;
@@ -139,7 +146,7 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution) -> b
 }
 
 /// True if the N shared parameters `which` differ from the given ones by more than chance:
-/// `κᵀ S κ`, S their information, is a χ² variable if they do not. `kappa`: those where the
+/// `κᵀ Σ⁻¹ κ`, Σ their covariance, is a χ² variable if they do not. `kappa`: those where the
 /// equations are.
 fn is_changed<const N: usize>(
     learned: &LearnedShape,
@@ -150,9 +157,15 @@ fn is_changed<const N: usize>(
     let Some((step, information)) = learned.shared() else {
         return false;
     };
+    let Some(covariance) = information.cholesky().map(|factor| factor.inverse()) else {
+        return false;
+    };
     let change = (kappa + step).fixed_rows::<N>(which.start).into_owned();
-    let information = information.fixed_view::<N, N>(which.start, which.start);
-    let square = (change.transpose() * information * change)[0];
+    let covariance = covariance.fixed_view::<N, N>(which.start, which.start);
+    let Some(of_change) = covariance.into_owned().cholesky() else {
+        return false;
+    };
+    let square = change.dot(&of_change.solve(&change));
     let bounds = chi_squared_bounds(2.0 * options.false_alarm_rate, N as f64);
     bounds.is_some_and(|(_, most)| square > most)
 }

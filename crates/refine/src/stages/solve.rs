@@ -52,10 +52,8 @@ pub fn run<'a>(
     state.frames.estimates.clone_from(&solution.unknowns.frames);
     state.kappa = solution.unknowns.kappa;
     shape::take_over(setup, state, &solution);
-    if may_learn_shape(&plan, state)
-        && shape::learn(setup, state, &solution)
-        && !has_solve_ahead(state)
-    {
+    let is_last = !has_solve_ahead(state);
+    if may_learn_shape(&plan, state) && shape::learn(setup, state, &solution, is_last) && is_last {
         plan_again(&plan, setup.options, state);
     }
     solution.remove_tested();

@@ -6,14 +6,16 @@
 //! frames roll, and the whole wall is wound around the axis a little. The rest is the same in all
 //! frames, a residual along the rows. It is estimated as one number, the readout time with which
 //! the frames fit best, with everything else free ([`crate::linear::bordered_system`]). The
-//! intrinsics are free, too, within their usual uncertainty, so that a wrong lens does not pass for
-//! a wrong time.
+//! intrinsics and the curvature of a straight tunnel are free, too, within their usual uncertainty,
+//! so that a wrong lens or a bend does not pass for a wrong time.
 
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
-use crate::parameters::calibration::{Calibration, INTRINSIC_PARAMETERS, Kappa, READOUT_INDEX};
+use crate::parameters::calibration::{
+    BEND_INDEX, BEND_PARAMETERS, Calibration, INTRINSIC_PARAMETERS, Kappa, READOUT_INDEX,
+};
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::solve;
@@ -109,7 +111,8 @@ pub fn estimate_readout(
     }))
 }
 
-/// The calibration with the intrinsics and the readout time free, besides what is free already.
+/// The calibration with the intrinsics, the readout time and, in a straight tunnel, the curvature
+/// free, besides what is free already.
 fn free_readout(context: &EstimationContext) -> Calibration {
     use CalibrationGroup::{Centre, Distortion, Focal};
     let mut calibration = context.calibration.intrinsics_only();
@@ -118,6 +121,8 @@ fn free_readout(context: &EstimationContext) -> Calibration {
     for k in (0..INTRINSIC_PARAMETERS).filter(|k| !context.calibration.free[*k]) {
         (calibration.free[k], calibration.sigma[k]) = (true, intrinsics.sigma[k]);
     }
+    let may_bend = context.gauge().shift;
+    calibration.free[BEND_INDEX..BEND_INDEX + BEND_PARAMETERS].fill(may_bend);
     // Any time up to that between frames is possible.
     calibration.free[READOUT_INDEX] = true;
     calibration.sigma[READOUT_INDEX] = context.prior.median_step_s;

@@ -8,6 +8,7 @@ use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
+use crate::problem::linearisation::FrameContribution;
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::MAX_MISFIT_SHARE;
 use crate::uncertainty::covariance::{Covariances, compute_covariances};
@@ -92,7 +93,7 @@ impl SolutionUncertainty {
             registration_px: match &total {
                 Some(total) => {
                     let estimates = &solution.unknowns.frames;
-                    let neighbours = neighbours(problem.pattern(), frames);
+                    let neighbours = neighbours(problem.pattern(), &solution.linearisation.frames);
                     registration_sigmas(context, estimates, &neighbours, total)
                 }
                 None => vec![f64::NAN; frames],
@@ -190,11 +191,13 @@ fn step_left(solution: &Solution) -> Result<(Vec<FrameStep>, Kappa), ProblemErro
     step.ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))
 }
 
-/// Of every frame, those that see part of the same wall.
-fn neighbours(pattern: &Pattern, frames: usize) -> Vec<Vec<usize>> {
-    let mut neighbours = vec![Vec::new(); frames];
-    for column in 0..frames {
-        for &row in pattern.rows(column).iter().filter(|row| **row != column) {
+/// Of every frame, those that are compared and may see part of the same wall.
+fn neighbours(pattern: &Pattern, frames: &[FrameContribution]) -> Vec<Vec<usize>> {
+    let mut neighbours = vec![Vec::new(); frames.len()];
+    let is_compared = |k: &usize| frames[*k].samples > 0;
+    for column in (0..frames.len()).filter(is_compared) {
+        let rows = pattern.rows(column).iter().filter(|row| is_compared(row));
+        for &row in rows.filter(|row| **row != column) {
             neighbours[row].push(column);
             neighbours[column].push(row);
         }
