@@ -83,7 +83,8 @@ impl Bend {
         self.at_h_m + (k * along_m).atan2(1.0 - c.dot(point)) / k
     }
 
-    /// Where a pose in the bent tunnel is in the straight one: `Qᵀ R`, `Qᵀ (t − C) + (0, h, 0)`.
+    /// Moves a pose in the bent tunnel to its place in the straight one: `Qᵀ R`,
+    /// `Qᵀ (t − C) + (0, h, 0)`.
     pub fn straightened(&self, pose: &Pose) -> Pose {
         let h_m = self.chainage_m(&pose.t_wc);
         let at = self.at(h_m);
@@ -92,7 +93,7 @@ impl Bend {
         Pose::new(inverse * pose.r_wc, Vector3::new(across.x, h_m, across.z))
     }
 
-    /// Where a pose in the straight tunnel is in the bent one: the inverse of
+    /// Moves a pose in the straight tunnel to its place in the bent one: the inverse of
     /// [`Bend::straightened`].
     pub fn bent(&self, pose: &Pose) -> Pose {
         let t = pose.t_wc;

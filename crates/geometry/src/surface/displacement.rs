@@ -116,7 +116,8 @@ mod tests {
         }
     }
 
-    /// Against the wall point of a pixel of a carried camera, from a straight and from a bent start.
+    /// Against the wall point of a pixel of a carried camera, from a straight and from a bent
+    /// start.
     #[test]
     fn jacobian_of_the_bend_matches_central_differences() {
         let straight: std::sync::Arc<dyn Surface> = std::sync::Arc::new(Circle::new(3.0).unwrap());

@@ -19,7 +19,8 @@
 //! ([`tunnelstitch_geometry::camera::Camera::intrinsics_jacobian`]). The readout time is free in
 //! the rolling-shutter test alone ([`crate::uncertainty::rolling_shutter_test`]), the curvature
 //! where a straight tunnel's shape is estimated ([`crate::stages::shape`]). With a curvature all
-//! poses are those in the bent tunnel, and a step of it carries them along ([`Calibration::carry`]).
+//! poses are those in the bent tunnel, and a step of it carries them along
+//! ([`Calibration::carry`]).
 //!
 //! The images do not change if the radius and all positions are scaled together. Poses are
 //! therefore estimated in the tunnel of the given radius, and only the prior, which is in metres,

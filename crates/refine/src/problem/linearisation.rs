@@ -28,7 +28,8 @@ pub struct Linearisation {
 
 impl Linearisation {
     /// The step of all slots and of the shared parameters by a factor of the normal matrix that is
-    /// damped by λ, with the shared parameters `held` fixed; None if the border is not positive definite.
+    /// damped by λ, with the shared parameters `held` fixed; None if the border is not positive
+    /// definite.
     pub fn step(
         &self,
         factor: &Factor,

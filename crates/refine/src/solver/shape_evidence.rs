@@ -13,10 +13,10 @@
 //! `σ_k² = |ĉ_k|²/γ_k`,  `γ_k = n_k − tr(A⁻¹)_kk/σ_k²`,
 //!
 //! γ_k being the number of coefficients that the pixels determine. Both count without mean, cos θ
-//! and sin θ of the section ([`Functions::retain_deformation`]): as these are hardly seen, the least
-//! error of the model moves them far, and they would raise the strength of the rest. Iterating this goes there, with
-//! one factorisation a step and no pixel read. Traces come from random signs z: the mean of
-//! `zᵀ A⁻¹ z`.
+//! and sin θ of the section ([`Functions::retain_deformation`]): as these are hardly seen, the
+//! least error of the model moves them far, and they would raise the strength of the rest.
+//! Iterating this goes there, with one factorisation a step and no pixel read. Traces come from
+//! random signs z: the mean of `zᵀ A⁻¹ z`.
 //!
 //! A scale that does not raise L by more than chance does ([`crate::model::significance`]) is
 //! dropped, the least useful first: a wall as planned ends without a shape, and its poses as if

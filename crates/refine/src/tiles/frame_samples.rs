@@ -108,9 +108,9 @@ impl<'a> SampledFrame<'a> {
         wall_jacobian(&self.pose, &points.centre)
     }
 
-    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2, ρ, c_x, c_z)` at the centre of a tile, for the `camera` at full
-    /// size; `a`: the pose's Jacobian there, `rate`: the motion of the frame's camera during a
-    /// readout of one second.
+    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2, ρ, c_x, c_z)` at the centre of a tile, for the `camera`
+    /// at full size; `a`: the pose's Jacobian there, `rate`: the motion of the frame's camera
+    /// during a readout of one second.
     ///
     /// A row that is read at the share u of the readout sees the wall as from the pose moved by
     /// `(ω u, R ν u)`, with ω and ν proportional to the readout time ρ:

@@ -104,11 +104,10 @@ fn wall_sigma_m(
 ) -> f64 {
     let (mut sum, mut points) = (0.0, 0.0);
     for ray_c in camera.grid_rays() {
-        if let Ok(hit) = surface.hit(&pose.t_wc, &(pose.r_wc * ray_c)) {
-            if let Some(variance) = variance(&hit, &surface.frame(hit.wall)) {
-                sum += variance;
-                points += 1.0;
-            }
+        let hit = surface.hit(&pose.t_wc, &(pose.r_wc * ray_c)).ok();
+        if let Some(variance) = hit.and_then(|hit| variance(&hit, &surface.frame(hit.wall))) {
+            sum += variance;
+            points += 1.0;
         }
     }
     f64::sqrt(sum / points)

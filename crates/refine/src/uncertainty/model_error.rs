@@ -47,7 +47,7 @@ use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::gauss_newton::Solution;
 use crate::uncertainty::covariance::{NoiseCovariance, exposures_alone};
 use crate::uncertainty::observability::Posterior;
-use crate::uncertainty::total_covariance::PointJacobians;
+use crate::uncertainty::pixel_jacobians::PointJacobians;
 use nalgebra::SMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,12 +1,69 @@
-//! Derivatives of the wall point that a pixel shows, by pose, shared parameters and shape.
+//! Derivatives of points of the wall by the unknowns: of the point that a pixel shows, and of sums
+//! of such.
 
 use crate::model::context::EstimationContext;
-use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS};
-use crate::uncertainty::total_covariance::{KappaJacobian, PixelJacobians};
+use crate::parameters::calibration::{
+    BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa, SHARED_PARAMETERS,
+};
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+use crate::parameters::shape::FunctionValue;
+use nalgebra::{Matrix2x6, SMatrix, Vector2};
+use std::collections::BTreeMap;
 use tunnelstitch_geometry::surface::{
     WallFrame, WallPoint, bend_jacobian, lens_jacobian, wall_jacobian,
 };
 use tunnelstitch_geometry::trajectory::Pose;
+
+/// Derivative of a point of the wall, `(s, h)`, by the unknowns of one slot.
+pub type SlotJacobian = SMatrix<f64, 2, FRAME_PARAMETERS>;
+/// Derivative of a point of the wall, `(s, h)`, by the shared parameters.
+pub type KappaJacobian = SMatrix<f64, 2, SHARED_PARAMETERS>;
+
+/// Derivatives of a point of the wall by all unknowns on which it depends.
+#[derive(Clone, Debug, Default)]
+pub struct PointJacobians {
+    /// By slots.
+    pub slots: BTreeMap<usize, SlotJacobian>,
+    /// By the shared parameters.
+    pub shared: KappaJacobian,
+}
+
+impl PointJacobians {
+    /// Adds `share` times the derivatives of the wall point of a fixed pixel: by its frame, the
+    /// slot `k`, and the shared parameters.
+    pub fn add_pixel(&mut self, k: usize, pixel: &PixelJacobians, share: f64) {
+        let pose = self.slots.entry(k).or_default();
+        let mut target = pose.fixed_columns_mut::<6>(0);
+        target += pixel.pose * share;
+        self.shared += pixel.shared * share;
+    }
+
+    /// Movement of the point by steps of the slots and of the shared parameters.
+    pub fn moved(&self, step: impl Fn(usize) -> FrameStep, shared: &Kappa) -> Vector2<f64> {
+        let of_slots = self.slots.iter();
+        let of_slots = of_slots.map(|(slot, jacobian)| jacobian * step(*slot));
+        of_slots.sum::<Vector2<f64>>() + self.shared * shared
+    }
+
+    /// Adds the derivatives by the shape: `τ φᵀ`; `first`: slot of the shape's first block.
+    pub fn add_shape(&mut self, tau: &Vector2<f64>, functions: &[FunctionValue], first: usize) {
+        for function in functions {
+            let slot = self.slots.entry(first + function.block).or_default();
+            let mut target = slot.column_mut(function.component);
+            target += tau * function.value;
+        }
+    }
+}
+
+/// Derivatives of the wall point of a fixed pixel.
+pub struct PixelJacobians {
+    /// `A = ∂(s, h)/∂ξ`.
+    pub pose: Matrix2x6<f64>,
+    /// `C = ∂(s, h)/∂κ`.
+    pub shared: KappaJacobian,
+    /// `τ = ∂(s, h)/∂δ`.
+    pub tau: Vector2<f64>,
+}
 
 /// Derivatives of the wall point `wall` with tangents `frame`, seen through a fixed pixel from
 /// `pose`.

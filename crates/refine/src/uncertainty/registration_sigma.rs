@@ -13,15 +13,15 @@
 use crate::model::context::EstimationContext;
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::uncertainty::frame_sigma::wall_sigma_px;
-use crate::uncertainty::pixel_jacobians::pixel_jacobians;
-use crate::uncertainty::total_covariance::{PointJacobians, TotalCovariance};
+use crate::uncertainty::pixel_jacobians::{PointJacobians, pixel_jacobians};
+use crate::uncertainty::total_covariance::TotalCovariance;
 use nalgebra::{Vector2, Vector3};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{Hit, WallFrame};
 
 /// Computes 1-σ of every frame against the wall that all show, pixels in the middle of the frame,
-/// root mean square over the part of it that others show; NaN where it is unknown. `neighbours`: of every frame, the
-/// frames that see part of the same wall.
+/// root mean square over the part of it that others show; NaN where it is unknown. `neighbours`: of
+/// every frame, the frames that see part of the same wall.
 pub fn registration_sigmas(
     context: &EstimationContext,
     estimates: &[FrameEstimate],

@@ -16,9 +16,10 @@ use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma_by};
 use crate::uncertainty::model_error::{EstimateErrors, ModelErrorReport};
 use crate::uncertainty::observability::{Posterior, UnobservableParameter};
 use crate::uncertainty::overdispersion::{Overdispersion, compute_overdispersions};
+use crate::uncertainty::pixel_jacobians::PointJacobians;
 use crate::uncertainty::pixel_jacobians::pixel_jacobians;
 use crate::uncertainty::registration_sigma::registration_sigmas;
-use crate::uncertainty::total_covariance::{PointJacobians, TotalCovariance};
+use crate::uncertainty::total_covariance::TotalCovariance;
 use tunnelstitch_geometry::surface::{Hit, WallFrame};
 
 /// The uncertainty of a solution.

@@ -3,12 +3,13 @@
 
 use crate::linear::bordered_system::{BorderBlock, SharedBlock};
 use crate::linear::normal_equations::Block;
-use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
-use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+use crate::parameters::calibration::Kappa;
+use crate::parameters::frame_estimate::FrameStep;
 use crate::parameters::shape::{FunctionValue, ShapeStep};
 use crate::uncertainty::covariance::{Covariances, NoiseCovariance};
 use crate::uncertainty::model_error::EstimateErrors;
-use nalgebra::{Matrix2x6, Matrix6, SMatrix, Vector2};
+use crate::uncertainty::pixel_jacobians::{KappaJacobian, PointJacobians};
+use nalgebra::Matrix6;
 use std::collections::BTreeMap;
 
 /// The covariance of the errors of all slots and of the shared parameters.
@@ -22,57 +23,6 @@ pub struct TotalCovariance {
     /// The undamped step of slots and shared parameters where the solve ended. Whether it would be
     /// right is not known, so it counts as an error.
     pub left: (Vec<FrameStep>, Kappa),
-}
-
-/// Derivative of a point of the wall, `(s, h)`, by the unknowns of one slot.
-pub type SlotJacobian = SMatrix<f64, 2, FRAME_PARAMETERS>;
-/// Derivative of a point of the wall, `(s, h)`, by the shared parameters.
-pub type KappaJacobian = SMatrix<f64, 2, SHARED_PARAMETERS>;
-
-/// Derivatives of a point of the wall by all unknowns on which it depends.
-#[derive(Clone, Debug, Default)]
-pub struct PointJacobians {
-    /// By slots.
-    pub slots: BTreeMap<usize, SlotJacobian>,
-    /// By the shared parameters.
-    pub shared: KappaJacobian,
-}
-
-impl PointJacobians {
-    /// Adds `share` times the derivatives of the wall point of a fixed pixel: by its frame, the
-    /// slot `k`, and the shared parameters.
-    pub fn add_pixel(&mut self, k: usize, pixel: &PixelJacobians, share: f64) {
-        let pose = self.slots.entry(k).or_default();
-        let mut target = pose.fixed_columns_mut::<6>(0);
-        target += pixel.pose * share;
-        self.shared += pixel.shared * share;
-    }
-
-    /// Movement of the point by steps of the slots and of the shared parameters.
-    pub fn moved(&self, step: impl Fn(usize) -> FrameStep, shared: &Kappa) -> Vector2<f64> {
-        let of_slots = self.slots.iter();
-        let of_slots = of_slots.map(|(slot, jacobian)| jacobian * step(*slot));
-        of_slots.sum::<Vector2<f64>>() + self.shared * shared
-    }
-
-    /// Adds the derivatives by the shape: `τ φᵀ`; `first`: slot of the shape's first block.
-    pub fn add_shape(&mut self, tau: &Vector2<f64>, functions: &[FunctionValue], first: usize) {
-        for function in functions {
-            let slot = self.slots.entry(first + function.block).or_default();
-            let mut target = slot.column_mut(function.component);
-            target += tau * function.value;
-        }
-    }
-}
-
-/// Derivatives of the wall point of a fixed pixel.
-pub struct PixelJacobians {
-    /// `A = ∂(s, h)/∂ξ`.
-    pub pose: Matrix2x6<f64>,
-    /// `C = ∂(s, h)/∂κ`.
-    pub shared: KappaJacobian,
-    /// `τ = ∂(s, h)/∂δ`.
-    pub tau: Vector2<f64>,
 }
 
 impl TotalCovariance {
