@@ -51,7 +51,7 @@ const CONVERGED: f64 = 0.05;
 /// Random sign vectors per scale. The relative error of γ is `√(2/(16 γ))` or less.
 const PROBES: usize = 16;
 /// Strength of a scale that is as good as dropped, over the given one.
-const NEGLIGIBLE: f64 = 1e-6;
+const NEGLIGIBLE: f64 = 1e-4;
 /// Largest factor of a strength in one step.
 const MAX_STEP_FACTOR: f64 = 30.0;
 
@@ -236,8 +236,11 @@ impl<'s> ShapeEquations<'s> {
                 let learned = (square / determined.max(f64::MIN_POSITIVE)).sqrt();
                 let factor = (learned.min(most_m) / sigmas_m[k])
                     .clamp(1.0 / MAX_STEP_FACTOR, MAX_STEP_FACTOR);
-                sigmas_m[k] *= factor;
-                largest_change = largest_change.max(factor.ln().abs());
+                // Weaker ones are lost in rounding.
+                let least_m = NEGLIGIBLE * self.shape.model.scales[k].sigma_m;
+                let next_m = (factor * sigmas_m[k]).max(least_m);
+                largest_change = largest_change.max((next_m / sigmas_m[k]).ln().abs());
+                sigmas_m[k] = next_m;
             }
             minimum = self.minimum(sigmas_m)?;
             if largest_change < CONVERGED {
