@@ -61,9 +61,10 @@ pub fn lens_jacobian(
 /// for a curvature c of the tunnel ([`super::Bend`]) along which the camera is carried.
 ///
 /// Seen from the camera's section, a wall point at the distance y along the tunnel and (x, z)
-/// across moves by `∂X = (½ y², −x y, 0) ∂c_x + (0, −z y, ½ y²) ∂c_z`, but for terms of
-/// the relative order `r |c|`; for the pixel it is as if the camera moved by `−∂X`: `−A_ρ Q ∂X`, with the section's
-/// frame Q. `straightened`: the pose in the straight tunnel. Rows: s, h; metres per 1/m.
+/// across moves by `∂X = (½ y², −x y, 0) ∂c_x + (0, −z y, ½ y²) ∂c_z`, but for terms of the
+/// relative order `r |c|`; for the pixel it is as if the camera moved by `−∂X`: `−A_ρ Q ∂X`, with
+/// the section's frame Q. `straightened`: the pose in the straight tunnel. Rows: s, h; metres per
+/// 1/m.
 pub fn bend_jacobian(
     pose: &Pose,
     straightened: &Pose,
