@@ -163,35 +163,15 @@ fn factor_rows(pattern: &Pattern, place_of: &[usize]) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear::test_dense::set_block;
+    use crate::linear::test_dense::random_equations;
     use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 
     #[test]
     fn blocks_agree_with_the_dense_inverse() {
-        let frames = 11;
-        let pairs = (0..frames).flat_map(|k| [(k, (k + 1).min(10)), (k, (k + 4).min(10))]);
-        let pattern = Pattern::new(frames, pairs);
-        let mut normal = NormalEquations::zeros(&pattern);
-        let n = frames * FRAME_PARAMETERS;
-        let mut dense = nalgebra::DMatrix::zeros(n, n);
-        let mut seed = 7u32;
-        let mut random = || {
-            seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
-            f64::from(seed >> 8) / f64::from(1 << 24) - 0.5
-        };
-        for column in 0..frames {
-            for &row in pattern.rows(column) {
-                let mut block = Block::from_fn(|_, _| random());
-                if row == column {
-                    block = block * block.transpose() + Block::identity() * 12.0;
-                }
-                normal.add_block(&pattern, row, column, &block);
-                set_block(&mut dense, row, column, &block);
-            }
-        }
+        let (pattern, normal, dense) = random_equations(11, 7, 12.0);
         let inverse = SelectedInverse::new(&pattern, &normal).unwrap();
         let expected = dense.try_inverse().unwrap();
-        for column in 0..frames {
+        for column in 0..pattern.columns() {
             for &row in pattern.rows(column) {
                 let block = inverse.block(row, column).unwrap();
                 for r in 0..FRAME_PARAMETERS {

@@ -198,33 +198,10 @@ impl Factor<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear::test_dense::set_block;
+    use crate::linear::test_dense::random_equations;
 
-    /// A random symmetric positive definite block matrix on a spiral-like pattern.
     fn example() -> (Pattern, NormalEquations, nalgebra::DMatrix<f64>) {
-        let frames = 9;
-        let pairs = (0..frames).flat_map(|k| [(k, (k + 1).min(8)), (k, (k + 4).min(8))]);
-        let pattern = Pattern::new(frames, pairs);
-        let mut normal = NormalEquations::zeros(&pattern);
-        let n = frames * FRAME_PARAMETERS;
-        let mut dense = nalgebra::DMatrix::zeros(n, n);
-        let mut seed = 1u32;
-        let mut random = || {
-            seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
-            f64::from(seed >> 8) / f64::from(1 << 24) - 0.5
-        };
-        for column in 0..frames {
-            for &row in pattern.rows(column) {
-                let mut block = Block::from_fn(|_, _| random());
-                if row == column {
-                    block = block * block.transpose() + Block::identity() * 20.0;
-                }
-                normal.add_block(&pattern, row, column, &block);
-                set_block(&mut dense, row, column, &block);
-            }
-            normal.gradient[column] = FrameStep::from_fn(|_, _| random());
-        }
-        (pattern, normal, dense)
+        random_equations(9, 1, 20.0)
     }
 
     #[test]

@@ -36,7 +36,7 @@
 //! Econometrics 92(1), 1999 (errors correlated in space).
 
 use crate::linear::bordered_system::SharedBlock;
-use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
+use crate::linear::normal_equations::{Block, Pattern};
 use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::model::significance::normal_quantile;
@@ -98,12 +98,13 @@ pub struct ErrorDraws {
 impl EstimateErrors {
     /// Finds the size of patches over which errors go together, and draws the errors that they and
     /// the prior make in the poses; those of the prior alone if the dispersion of single blocks is
-    /// the largest. None if the prior leaves a pose free.
+    /// the largest. None if the prior leaves a pose free. `factor`: of the normal matrix.
     ///
     /// # Errors
     /// [`ProblemError`]: a frame that cannot be read, a singular normal matrix.
     pub fn find(
         solution: &Solution,
+        factor: &Factor,
         posterior: Option<&Posterior>,
         of_noise: &NoiseCovariance,
         alpha: f64,
@@ -112,13 +113,9 @@ impl EstimateErrors {
         let pattern = problem.pattern();
         let normal = &solution.linearisation.normal;
         let frames = solution.unknowns.frames.len();
-        let factor_of = |normal: &NormalEquations| {
-            let factor = problem.symbolic().factorise(pattern, normal, 0.0);
-            factor.map_err(|source| problem.factor_error(source))
-        };
-        let factor = factor_of(normal)?;
         let exposures_alone = exposures_alone(pattern, frames, normal);
-        let exposures = factor_of(&exposures_alone)?;
+        let exposures = problem.symbolic().factorise(pattern, &exposures_alone, 0.0);
+        let exposures = exposures.map_err(|source| problem.factor_error(source))?;
         let (prior, _) = problem.prior_information(&solution.unknowns);
         let Some(prior) = PriorRoot::of(pattern, &prior) else {
             return Ok(None);
@@ -126,7 +123,7 @@ impl EstimateErrors {
         let curvature = solution.record.curvature();
         let draw = |scores: &PatchScores, posterior, curvature| {
             let system = System {
-                factor: &factor,
+                factor,
                 exposures: &exposures,
                 posterior,
                 scores,

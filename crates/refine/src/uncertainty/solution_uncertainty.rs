@@ -2,7 +2,7 @@
 
 use crate::linear::bordered_system::SharedBlock;
 use crate::linear::normal_equations::Pattern;
-use crate::linear::sparse_cholesky::FactorError;
+use crate::linear::sparse_cholesky::{Factor, FactorError};
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
@@ -16,8 +16,7 @@ use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma_by};
 use crate::uncertainty::model_error::{EstimateErrors, ModelErrorReport};
 use crate::uncertainty::observability::{Posterior, UnobservableParameter};
 use crate::uncertainty::overdispersion::{Overdispersion, compute_overdispersions};
-use crate::uncertainty::pixel_jacobians::PointJacobians;
-use crate::uncertainty::pixel_jacobians::pixel_jacobians;
+use crate::uncertainty::pixel_jacobians::{PointJacobians, pixel_jacobians};
 use crate::uncertainty::registration_sigma::registration_sigmas;
 use crate::uncertainty::total_covariance::TotalCovariance;
 use tunnelstitch_geometry::surface::{Hit, WallFrame};
@@ -70,15 +69,19 @@ impl SolutionUncertainty {
         // Poses without a covariance still count; they are reported as uncertain.
         let total = match of_noise {
             Ok(of_noise) => {
-                let errors = EstimateErrors::find(solution, posterior.as_ref(), &of_noise, alpha)?;
+                let normal = &solution.linearisation.normal;
+                let factor = problem.symbolic().factorise(problem.pattern(), normal, 0.0);
+                let factor = factor.map_err(|source| problem.factor_error(source))?;
+                let posterior = posterior.as_ref();
+                let errors = EstimateErrors::find(solution, &factor, posterior, &of_noise, alpha)?;
                 if let (Some(shared), Some(errors)) = (&mut shared, &errors) {
                     *shared += errors.draws.of_shared();
                 }
-                let of_shared = posterior.as_ref().zip(shared);
+                let of_shared = posterior.zip(shared);
                 Some(TotalCovariance {
                     of_noise,
                     errors,
-                    left: step_left(solution)?,
+                    left: step_left(solution, &factor)?,
                     shared: of_shared.map(|(posterior, shared)| (posterior.w.clone(), shared)),
                 })
             }
@@ -181,14 +184,14 @@ impl SolutionUncertainty {
     }
 }
 
-/// The undamped step of all slots and of the shared parameters where the solve ended.
-fn step_left(solution: &Solution) -> Result<(Vec<FrameStep>, Kappa), ProblemError> {
-    let (problem, at) = (&solution.problem, &solution.linearisation);
-    let factor = problem
-        .symbolic()
-        .factorise(problem.pattern(), &at.normal, 0.0);
-    let factor = factor.map_err(|source| problem.factor_error(source))?;
-    let step = at.step(&factor, 0.0, problem.tested());
+/// The undamped step of all slots and of the shared parameters where the solve ended; `factor`: of
+/// the normal matrix there.
+fn step_left(
+    solution: &Solution,
+    factor: &Factor,
+) -> Result<(Vec<FrameStep>, Kappa), ProblemError> {
+    let problem = &solution.problem;
+    let step = (solution.linearisation).step(factor, 0.0, problem.tested());
     step.ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))
 }
 
