@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Smallest number of times that each command is killed.
-const KILLS: usize = 4;
+const KILLS: u32 = 4;
 
 /// A simulated survey.
 fn survey(folder: &Path, frames: usize, size: &str) -> PathBuf {
@@ -38,7 +38,8 @@ fn start(arguments: &[&str]) -> Child {
 }
 
 /// Starts the command and kills it at random moments, at least until one run has continued another
-/// one, and then lets it end.
+/// one, and then lets it end. Each run is given more time than the last: the machine may have become
+/// busier.
 fn killed(arguments: &[&str], takes: Duration, seed: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut kills, mut resumed) = (0, 0);
@@ -48,11 +49,12 @@ fn killed(arguments: &[&str], takes: Duration, seed: u64) {
             "of {run} runs {kills} were killed and {resumed} had continued"
         );
         let mut child = start(arguments);
-        std::thread::sleep(takes.mul_f64(rng.random_range(0.1..0.8)));
+        let patience = 1.0 + f64::from(run) / f64::from(KILLS);
+        std::thread::sleep(takes.mul_f64(patience * rng.random_range(0.1..0.8)));
         child.kill().unwrap();
         let output = child.wait_with_output().unwrap();
-        kills += usize::from(!output.status.success());
-        resumed += usize::from(
+        kills += u32::from(!output.status.success());
+        resumed += u32::from(
             String::from_utf8_lossy(&output.stdout).contains("continuing the interrupted run"),
         );
         if kills >= KILLS && resumed > 0 {

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | `lining` | sum of all deviations |
 //! | `undulation` | ovality, and a random field of given size and length |
+//! | `periodic_table` | the field's values, tabulated |
 //! | `segments` | rings of segments with a step between them |
 //! | `segment_joints` | dark lines of their joints, over any texture |
 //! | `shape_spline` | displacement of a shape.json |
@@ -12,6 +13,7 @@
 // The folder's namesake holds its main type.
 #[allow(clippy::module_inception)]
 pub(super) mod lining;
+mod periodic_table;
 pub(super) mod segment_joints;
 pub(super) mod segments;
 mod shape_spline;

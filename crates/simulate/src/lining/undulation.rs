@@ -2,12 +2,15 @@
 //!
 //! The deviation at the angle θ and the chainage h is `a cos 2(θ − θ_0) + u(θ, h)`, with the
 //! undulation u a sum of [`WAVES`] cosines of random phase. Their wave numbers are drawn from the
-//! spectrum of a Gaussian correlation `exp(−x²/2ℓ²)`, of which u is a sample.
+//! spectrum of a Gaussian correlation `exp(−x²/2ℓ²)`, of which u is a sample. They are whole numbers
+//! of waves around the section and in [`PERIOD_LENGTHS`] ℓ along the axis, so u is tabulated once
+//! and has no ends.
 //!
 //! Source: M. Shinozuka, C.-M. Jan, "Digital simulation of random processes and its applications",
 //! Journal of Sound and Vibration 25(1), 1972.
 
 use crate::as_built::AsBuilt;
+use crate::lining::periodic_table::PeriodicTable;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -15,15 +18,16 @@ use std::f64::consts::TAU;
 
 /// Number of cosines.
 const WAVES: usize = 240;
+/// Period of the undulation along the axis, correlation lengths.
+const PERIOD_LENGTHS: usize = 64;
 
 /// An oval with undulations.
 #[derive(Clone, Debug)]
 pub(super) struct Undulation {
     ovality_m: f64,
     ovality_at_rad: f64,
-    /// Amplitude of each cosine, metres.
-    amplitude_m: f64,
-    waves: Vec<Wave>,
+    /// u, metres; None without undulation.
+    table: Option<PeriodicTable>,
 }
 
 /// One cosine.
@@ -31,7 +35,7 @@ pub(super) struct Undulation {
 struct Wave {
     /// Waves around the section, a whole number.
     around: f64,
-    /// Wave number along the axis, 1/m.
+    /// Waves in a period along the axis, a whole number.
     along: f64,
     phase: f64,
 }
@@ -41,34 +45,41 @@ impl Undulation {
     pub fn new(radius_m: f64, as_built: &AsBuilt, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let length_m = as_built.undulation_length_m;
+        let period_m = PERIOD_LENGTHS as f64 * length_m;
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let mut waves: Vec<Wave> = (0..WAVES)
             .map(|_| Wave {
                 around: (normal() * radius_m / length_m).round(),
-                along: normal() / length_m,
+                along: (normal() * PERIOD_LENGTHS as f64 / TAU).round(),
                 phase: 0.0,
             })
             .collect();
         for wave in &mut waves {
             wave.phase = rng.random_range(0.0..TAU);
         }
+        let amplitude_m = 1e-3 * as_built.undulation_mm * (2.0 / WAVES as f64).sqrt();
+        let undulation_m = |theta: f64, h_m: f64| {
+            let cosine = |wave: &Wave| {
+                let turns = wave.along * h_m / period_m;
+                (wave.around * theta + TAU * turns + wave.phase).cos()
+            };
+            amplitude_m * waves.iter().map(cosine).sum::<f64>()
+        };
         Self {
             ovality_m: 1e-3 * as_built.ovality_mm,
             ovality_at_rad: rng.random_range(0.0..TAU),
-            amplitude_m: 1e-3 * as_built.undulation_mm * (2.0 / WAVES as f64).sqrt(),
-            waves: if as_built.undulation_mm > 0.0 {
-                waves
-            } else {
-                Vec::new()
-            },
+            table: (as_built.undulation_mm > 0.0)
+                .then(|| PeriodicTable::new(TAU * radius_m, period_m, length_m, undulation_m)),
         }
     }
 
     /// Deviation from the radius, metres.
     pub fn deviation_m(&self, theta: f64, h_m: f64) -> f64 {
-        let cosine = |wave: &Wave| (wave.around * theta + wave.along * h_m + wave.phase).cos();
         let oval = self.ovality_m * (2.0 * (theta - self.ovality_at_rad)).cos();
-        oval + self.amplitude_m * self.waves.iter().map(cosine).sum::<f64>()
+        oval + self
+            .table
+            .as_ref()
+            .map_or(0.0, |table| table.at(theta, h_m))
     }
 }
 
