@@ -14,6 +14,8 @@ pub struct Alignment {
     /// Uncertainty σ of the displacement, pixels of full size; infinite where the texture is too
     /// faint.
     pub sigma_px: f64,
+    /// Degrees of freedom of σ: patches of the overlap less unknowns.
+    pub freedoms: f64,
     /// Correlation of their grey values at the present poses, without robust weights that could
     /// hide that the frames show different things: of all samples or of most, whichever is greater.
     pub correlation: f64,

@@ -6,7 +6,7 @@
 //! without texture, or the prior.
 
 use crate::model::rejection::RejectionReason;
-use crate::model::significance::normal_quantile;
+use crate::model::significance::student_quantile;
 use crate::options::RefineOptions;
 use crate::problem::linearisation::FrameContribution;
 use crate::thresholds::inconsistent_frames::{
@@ -107,8 +107,10 @@ pub fn find_inconsistent_frames(
 struct Limits {
     /// Displacement that is accepted, pixels.
     max_error_px: f64,
-    /// z: σ beyond it from which on a pair is misaligned.
-    sigmas: f64,
+    /// Probability that any of the pairs is found to be displaced although none is.
+    false_alarm_rate: f64,
+    /// Number of pairs.
+    pairs: usize,
 }
 
 impl Limits {
@@ -125,7 +127,8 @@ impl Limits {
         let ratio = (pairs as f64 / options.false_alarm_rate).ln() / std::f64::consts::LN_2;
         Self {
             max_error_px: (2.0 * options.max_sigma_px).max(ratio.sqrt() * median),
-            sigmas: normal_quantile(options.false_alarm_rate, pairs),
+            false_alarm_rate: options.false_alarm_rate,
+            pairs,
         }
     }
 
@@ -134,7 +137,8 @@ impl Limits {
     fn is_misaligned(&self, pair: &Alignment) -> bool {
         let is_different =
             pair.sigma_px <= MAX_TYING_SIGMA_PX && pair.correlation < MIN_CORRELATION;
-        is_different || pair.error_px > self.max_error_px + self.sigmas * pair.sigma_px
+        let sigmas = student_quantile(self.false_alarm_rate, self.pairs, pair.freedoms);
+        is_different || pair.error_px > self.max_error_px + sigmas * pair.sigma_px
     }
 }
 
@@ -169,6 +173,7 @@ mod tests {
             samples: 100.0,
             error_px,
             sigma_px: 0.03,
+            freedoms: 50.0,
             correlation: 0.9,
         }
     }

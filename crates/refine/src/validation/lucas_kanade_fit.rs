@@ -25,17 +25,22 @@ pub struct TemplateSample {
     pub patch: usize,
 }
 
+/// Unknowns of a step.
+const UNKNOWNS: usize = 8;
+
 /// The normal equations of one step, for displacement field, gain and bias.
 pub struct AffineFit {
     /// The normal matrix N.
-    n: SMatrix<f64, 8, 8>,
+    n: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     /// The right side.
-    right: SVector<f64, 8>,
+    right: SVector<f64, UNKNOWNS>,
     /// Scatter of the scores `Σ g gᵀ`, g the contribution of a patch to the right side.
-    scatter: SMatrix<f64, 8, 8>,
+    scatter: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     /// Mean `W = Σ x xᵀ / Σ 1` over the regressors.
     w: Matrix3<f64>,
     samples: f64,
+    /// Number of patches with samples.
+    patches: f64,
     /// Correlation at the present poses.
     correlation: f64,
     /// False if the slopes are mostly noise.
@@ -44,8 +49,7 @@ pub struct AffineFit {
 
 impl AffineFit {
     /// Linearises the samples shared with another frame, in a number of `patches`; `slope_noise`
-    /// and
-    /// `variance`: of the noise of a slope, and of the residuals.
+    /// and `variance`: of the noise of a slope, and of the residuals.
     pub fn new(
         shared: &[(&TemplateSample, f32)],
         patches: usize,
@@ -54,9 +58,10 @@ impl AffineFit {
         variance: f32,
         correlation: f64,
     ) -> Self {
-        let mut scores = vec![SVector::<f64, 8>::zeros(); patches];
-        let mut n = SMatrix::<f64, 8, 8>::zeros();
-        let mut right = SVector::<f64, 8>::zeros();
+        let mut has_samples = vec![false; patches];
+        let mut scores = vec![SVector::<f64, UNKNOWNS>::zeros(); patches];
+        let mut n = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
+        let mut right = SVector::<f64, UNKNOWNS>::zeros();
         let mut w = Matrix3::<f64>::zeros();
         let mut weighted = Matrix3::<f64>::zeros();
         let (gain32, bias32) = (gain as f32, bias as f32);
@@ -70,7 +75,7 @@ impl AffineFit {
             let (gs, gh) = (gain32 * sample.slope[0], gain32 * sample.slope[1]);
             // I_b(x + d) ≈ a I_a(x) + b − a ∇I_a · δ with δ the remaining displacement, so the row
             // of δ is −a∇I_a.
-            let row = SVector::<f64, 8>::from_column_slice(&[
+            let row = SVector::<f64, UNKNOWNS>::from_column_slice(&[
                 f64::from(-gs * x[0]),
                 f64::from(-gs * x[1]),
                 f64::from(-gs * x[2]),
@@ -82,10 +87,11 @@ impl AffineFit {
             ]);
             let omega = f64::from(omega);
             n += omega * row * row.transpose();
+            has_samples[sample.patch] = true;
             scores[sample.patch] += omega * f64::from(e) * row;
             weighted += omega * outer;
         }
-        let mut scatter = SMatrix::<f64, 8, 8>::zeros();
+        let mut scatter = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
         for score in &scores {
             right += score;
             scatter += score * score.transpose();
@@ -108,13 +114,14 @@ impl AffineFit {
             scatter,
             w: w / shared.len() as f64,
             samples: shared.len() as f64,
+            patches: has_samples.into_iter().filter(|has| *has).count() as f64,
             correlation,
             has_texture,
         }
     }
 
     /// The Gauss–Newton step; None if there is too little texture.
-    pub fn step(&self) -> Option<SVector<f64, 8>> {
+    pub fn step(&self) -> Option<SVector<f64, UNKNOWNS>> {
         if self.has_texture {
             Some(self.n.cholesky()?.solve(&self.right))
         } else {
@@ -141,14 +148,17 @@ impl AffineFit {
 
     /// The alignment at the field `p`; `scale`: pixels of full size per pixel of the level.
     pub fn alignment(&self, p: &Vector6<f64>, scale: f64, variance: f64) -> Alignment {
-        let square = |covariance: &SMatrix<f64, 8, 8>| {
+        let freedoms = self.patches - UNKNOWNS as f64;
+        let square = |covariance: &SMatrix<f64, UNKNOWNS, UNKNOWNS>| {
             let of = |k| covariance.fixed_view::<3, 3>(k, k).component_mul(&self.w);
             of(0).sum() + of(3).sum()
         };
         let square = self.n.cholesky().map_or(f64::INFINITY, |n| {
             let inverse = n.inverse();
+            // The fit has made the scores smaller than they are.
+            let correction = self.patches / freedoms.max(0.0);
             let sandwich = inverse * self.scatter * inverse;
-            square(&(variance * inverse)).max(square(&sandwich))
+            square(&(variance * inverse)).max(correction * square(&sandwich))
         });
         Alignment {
             a: 0,
@@ -156,6 +166,7 @@ impl AffineFit {
             samples: self.samples,
             error_px: scale * self.rms(p),
             sigma_px: scale * square.sqrt(),
+            freedoms,
             correlation: self.correlation,
         }
     }

@@ -12,15 +12,17 @@
 //! wall. With N the normal matrix, corrected for the noise in its slopes, and v the variance of the
 //! residuals, P has the covariance `v N⁻¹` if they are noise. Glints are not: steeper than a faint
 //! wall, they move with the camera. So the influence of every sample is bounded to that of one a
-//! few times as steep as the median. With g the contributions of patches of samples to the
-//! gradient, the covariance is `C = N⁻¹ (Σ g gᵀ) N⁻¹` where that makes σ larger, whatever the
-//! residuals are like.
+//! few times as steep as the median. With g the contributions of n patches of samples to the
+//! gradient, the covariance is `C = n/(n − 8) N⁻¹ (Σ g gᵀ) N⁻¹` where that makes σ larger, whatever
+//! the residuals are like.
 //!
 //! The root mean square of the displacement over the overlap is `e = √(pᵀWp)`, to which errors
 //! alone contribute `σ = √tr(C W)`. By the triangle inequality, frames that are aligned to τ show
-//! `e > τ + z σ` no more often than a Gaussian exceeds z standard deviations.
+//! `e > τ + t σ` no more often than Student's variable of n − 8 degrees of freedom exceeds t.
 //!
-//! Source: B. D. Lucas and T. Kanade, "An iterative image registration technique with an
+//! Source: J. G. MacKinnon and H. White, "Some heteroskedasticity-consistent covariance matrix
+//! estimators with improved finite sample properties", Journal of Econometrics 29(3), 1985 (the
+//! factor); B. D. Lucas and T. Kanade, "An iterative image registration technique with an
 //! application to stereo vision", 1981.
 
 use crate::model::context::EstimationContext;
