@@ -302,12 +302,24 @@ fn a_bend_that_is_declared_straight_is_found() {
     let report = json(&out.join("refine.json"));
     assert_eq!(report["frames_on_prior"], 0);
     assert_eq!(report["shape"]["scales"], serde_json::json!([]));
+    let unseen = report["shape"]["unseen"].as_array().unwrap();
+    assert_eq!(unseen.len(), 4, "{unseen:?}");
+    for scale in unseen {
+        let below_mm = scale["below_mm"].as_f64().unwrap();
+        assert!((0.01..5.0).contains(&below_mm), "{scale}");
+    }
     let number = |name: &str| report["bend"][name].as_f64().unwrap();
     let sigma_m = number("radius_sigma_m");
     assert!(sigma_m < 0.05 * radius_m, "{sigma_m}");
     assert!((number("radius_m") - radius_m).abs() < 3.0 * sigma_m);
-    // What is found is used, and is where a second refinement starts.
     let (poses, again) = (out.join("poses.tum"), dir.path().join("again"));
+    let (panorama, maps) = (dir.path().join("wall.tif"), dir.path().join("maps"));
+    let stitch = ["stitch", text(&out), "--poses", text(&poses), "--out"];
+    let files = [text(&panorama), "--maps", text(&maps)];
+    let coarse = ["--px-per-metre", "20", "--quiet"];
+    succeed(&[&stitch[..], &files, &coarse].concat());
+    assert!(maps.join("resolution.tif").exists() && !maps.join("deformation.tif").exists());
+    // What is found is used, and is where a second refinement starts.
     let locate = ["locate", text(&survey), "--poses", text(&poses)];
     let said = succeed(&[&locate[..], &["--frame", "20,100,75"]].concat());
     assert!(said.contains("chainage"), "{said}");

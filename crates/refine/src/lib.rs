@@ -94,6 +94,6 @@ pub use uncertainty::cramer_rao::{FINER, PoseBounds, pose_bounds};
 pub use uncertainty::frame_sigma::FrameSigma;
 pub use uncertainty::model_error::ModelErrorReport;
 pub use uncertainty::rolling_shutter_test::ReadoutEstimate;
-pub use uncertainty::shape_report::{EstimatedShape, ScaleReport, ShapeReport};
+pub use uncertainty::shape_report::{EstimatedShape, ScaleReport, ShapeReport, UnseenScaleReport};
 pub use verdict::prior_test::{PriorTest, ScaleTest, SigmaTest};
 pub use verdict::survey_verdict::SurveyVerdict;

@@ -281,6 +281,12 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
             arguments.out.join(SECTIONS_FILE).display()
         ));
     }
+    let none_above_mm = report.shape.as_ref().and_then(|s| s.none_above_mm());
+    if let Some(none_above_mm) = none_above_mm {
+        terminal.say(format!(
+            "no deformation of the wall is seen; {none_above_mm:.2} mm (root mean square) would be"
+        ));
+    }
     if report.calibration.is_some() {
         terminal.say(format!(
             "{out} is a survey with the refined calibration: tunnelstitch stitch {out} --poses {} \

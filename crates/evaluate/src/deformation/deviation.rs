@@ -108,12 +108,10 @@ impl DeviationMap {
     /// A shape file that cannot be read.
     pub fn of_survey(survey: &Survey) -> Result<Option<Self>, SurveyError> {
         let file = survey.shape_file()?;
-        Ok(file.map(|file| {
-            Self::new(
-                survey.nominal.as_ref(),
-                file.field(),
-                file.deviation_sigma_m,
-            )
+        Ok(file.and_then(|file| {
+            let field = file.displacement()?;
+            let nominal = survey.nominal.as_ref();
+            Some(Self::new(nominal, field, file.deviation_sigma_m))
         }))
     }
 

@@ -68,6 +68,17 @@ impl Functions {
         }
     }
 
+    /// Root mean square over the wall of a displacement by functions of strength 1.
+    ///
+    /// A cubic B-spline has the square integral 151/315 in either direction; at any angle
+    /// `Σ_m cos² mθ + sin² mθ = 4`.
+    pub fn rms(&self) -> f64 {
+        match *self {
+            Self::Harmonics => 2.0,
+            Self::Lattice { .. } => 151.0 / 315.0,
+        }
+    }
+
     /// Number of coefficients that [`Functions::retain_deformation`] leaves.
     pub fn deformations(&self) -> usize {
         let all = BLOCK_FUNCTIONS * self.blocks();
@@ -131,6 +142,8 @@ pub struct ShapeModel {
     extent_h_m: [f64; 2],
     /// The scales.
     pub scales: Vec<Scale>,
+    /// Scales that the wall is not seen to have, with the largest strength that they may have.
+    pub dropped: Vec<Scale>,
 }
 
 /// A wall's shape: coefficients of a model.
@@ -171,6 +184,7 @@ impl ShapeModel {
                 functions: Functions::Harmonics,
                 sigma_m,
             }],
+            dropped: Vec::new(),
         };
         let mut columns = MIN_COLUMNS;
         while columns <= finest {
@@ -456,6 +470,28 @@ mod tests {
             let difference = field.at(wall).delta_m - sum(&shape, wall);
             // Harmonics are splines to a thousandth.
             assert!(difference.abs() < 3e-3, "{difference}");
+        }
+    }
+
+    #[test]
+    fn functions_of_strength_one_have_the_stated_size() {
+        let model = ShapeModel::new(18.0, WallPoint::default(), [0.0, 9.0], 8, 1.0);
+        let (mut harmonics, mut lattice) = (0.0, 0.0);
+        for k in 0..1000 {
+            let wall = WallPoint {
+                s_m: 0.37 * f64::from(k),
+                h_m: 3.0 + 0.0023 * f64::from(k),
+            };
+            for function in model.functions_at(wall) {
+                let sum = match function.block {
+                    0 => &mut harmonics,
+                    _ => &mut lattice,
+                };
+                *sum += function.value * function.value / 1000.0;
+            }
+        }
+        for (scale, square) in model.scales.iter().zip([harmonics, lattice]) {
+            assert!((scale.functions.rms() / f64::sqrt(square) - 1.0).abs() < 0.01);
         }
     }
 

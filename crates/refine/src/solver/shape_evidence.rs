@@ -22,6 +22,9 @@
 //! dropped, the least useful first: a wall as planned ends without a shape, and its poses as if
 //! none had been looked for.
 //!
+//! What may hide below that is told by the same L: the strength of a dropped scale at which L has
+//! fallen by `½ z²` ([`LearnedShape::dropped_scales`]), z the quantile of the false-alarm rate.
+//!
 //! A solve that ends for want of descent, as where the wall is not smooth, leaves a gradient that
 //! leads nowhere: then its end is taken for the minimum.
 //!
@@ -35,7 +38,7 @@ use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
 use crate::model::significance::normal_quantile;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
-use crate::parameters::shape::{Functions, Shape, ShapeModel, ShapeStep};
+use crate::parameters::shape::{Functions, Scale, Shape, ShapeModel, ShapeStep};
 use crate::solver::gauss_newton::Solution;
 use nalgebra::SMatrix;
 use rand::{Rng, SeedableRng};
@@ -50,6 +53,8 @@ const MAX_STEPS: usize = 8;
 const CONVERGED: f64 = 0.05;
 /// Random sign vectors per scale. The relative error of γ is `√(2/(16 γ))` or less.
 const PROBES: usize = 16;
+/// Bisections of the logarithm of a dropped scale's strength, which leave a sixth of it open.
+const LIMIT_BISECTIONS: usize = 6;
 /// Strength of a scale that is as good as dropped, over the given one.
 const NEGLIGIBLE: f64 = 1e-4;
 /// Largest factor of a strength in one step.
@@ -207,8 +212,7 @@ impl<'s> ShapeEquations<'s> {
     }
 
     /// Goes to the strengths of the largest evidence up to `most_m`, but for those of `dropped`
-    /// scales, and
-    /// returns the minimum there.
+    /// scales, and returns the minimum there.
     fn fixed_point(
         &self,
         sigmas_m: &mut [f64],
@@ -294,6 +298,31 @@ impl LearnedShape<'_> {
         }
     }
 
+    /// The dropped scales, with the largest strength that each may have but for the probability
+    /// `alpha`, up to `most_m` metres; none if the equations are singular.
+    pub fn dropped_scales(&self, most_m: f64, alpha: f64) -> Vec<Scale> {
+        let scales = &self.equations.shape.model.scales;
+        let least = self.minimum.log_evidence - 0.5 * normal_quantile(alpha, 1).powi(2);
+        let dropped: Vec<usize> = (0..scales.len()).filter(|k| self.dropped[*k]).collect();
+        let limits = dropped.par_map(|k| {
+            let scale = scales[*k];
+            let (mut below_m, mut above_m) = (NEGLIGIBLE * scale.sigma_m, most_m);
+            for _ in 0..LIMIT_BISECTIONS {
+                let mut sigmas_m = self.sigmas_m.clone();
+                sigmas_m[*k] = (below_m * above_m).sqrt();
+                match self.equations.minimum(&sigmas_m)?.log_evidence < least {
+                    true => above_m = sigmas_m[*k],
+                    false => below_m = sigmas_m[*k],
+                }
+            }
+            Some(Scale {
+                sigma_m: above_m,
+                ..scale
+            })
+        });
+        limits.into_iter().flatten().collect()
+    }
+
     /// The shape after a step of all slots, without the dropped scales.
     pub fn shape_after(&self, step: &[FrameStep]) -> Shape {
         let before = &self.equations.shape;
@@ -322,8 +351,7 @@ mod tests {
     use tunnelstitch_geometry::surface::WallPoint;
 
     /// Every coefficient is observed with an error of 1 mm; those of one lattice are 5 mm, all
-    /// others
-    /// 0. Strengths begin at 10 mm.
+    /// others 0. Strengths begin at 10 mm.
     #[test]
     fn strengths_are_those_of_the_wall_and_useless_scales_are_dropped() {
         let model = ShapeModel::new(18.0, WallPoint::default(), [0.0, 9.0], 16, 0.01);
@@ -355,6 +383,15 @@ mod tests {
             first_slot: 1,
         };
         let learned = equations.learn(0.03, 1e-3).unwrap();
+        // Each of n coefficients is known to 1 mm, so L falls by about n σ⁴/4 mm⁴.
+        for dropped in learned.dropped_scales(0.03, 1e-3) {
+            let n = 8.0 * dropped.functions.blocks() as f64;
+            let expected_m = 1e-3 * (4.0 * 4.77 / n).powf(0.25);
+            assert!(
+                (0.5..2.5).contains(&(dropped.sigma_m / expected_m)),
+                "{dropped:?}"
+            );
+        }
         let learned = learned.shape_after(&learned.minimum.step);
         let scales = &learned.model.scales;
         assert_eq!(scales.len(), 1, "{scales:?}");

@@ -84,6 +84,7 @@ fn adopt(setup: &Setup, state: &mut PipelineState, mut shape: Shape) {
     let is_plausible = |block: &ShapeStep| (0.0..=most_m).contains(&block.amax());
     if !shape.coefficients.iter().all(is_plausible) {
         shape.model.scales.clear();
+        shape.model.dropped.clear();
         shape.coefficients.clear();
         fix_shared(setup, state);
     }
@@ -126,7 +127,10 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_l
     let Some((step, shared)) = learned.step_holding(&held) else {
         return false;
     };
-    let shape = with_finer_lattice(learned.shape_after(&step));
+    let mut shape = learned.shape_after(&step);
+    let limits = learned.dropped_scales(most_m, setup.options.false_alarm_rate);
+    shape.model.dropped.extend(limits);
+    let shape = with_finer_lattice(shape);
     let before = solution.problem.shape().map(|before| &before.model);
     if free == state.free && before.is_some_and(|before| !is_rescaled(before, &shape.model)) {
         return false;

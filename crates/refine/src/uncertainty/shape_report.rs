@@ -32,6 +32,9 @@ pub struct EstimatedShape {
 pub struct ShapeReport {
     /// Scales at which the wall deviates from the nominal one; empty if it is not seen to.
     pub scales: Vec<ScaleReport>,
+    /// Scales at which it is not seen to.
+    #[serde(default)]
+    pub unseen: Vec<UnseenScaleReport>,
     /// Displacement over the wall, root mean square, millimetres.
     pub rms_mm: f64,
     /// 1-σ of the displacement, root mean square over the wall, millimetres.
@@ -48,6 +51,18 @@ pub struct ScaleReport {
     pub spacing_m: Option<f64>,
     /// Its strength: 1-σ of its coefficients, as learned from the frames, millimetres.
     pub sigma_mm: f64,
+}
+
+/// A scale at which no deformation is seen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct UnseenScaleReport {
+    /// Distance of the nodes of its lattice, metres; none for the harmonics (ovality).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spacing_m: Option<f64>,
+    /// Displacement over the wall, root mean square, millimetres, that would have been seen: less
+    /// than the false-alarm rate of all such walls show nothing.
+    pub below_mm: f64,
 }
 
 impl EstimatedShape {
@@ -147,14 +162,28 @@ fn sigma_at(
 }
 
 impl ShapeReport {
+    /// Deformation of any scale that would have been seen if there were one, root mean square,
+    /// millimetres; None if one is seen, or if none was looked for.
+    pub fn none_above_mm(&self) -> Option<f64> {
+        let limits = self.unseen.iter().map(|scale| scale.below_mm);
+        limits
+            .max_by(f64::total_cmp)
+            .filter(|_| self.scales.is_empty())
+    }
+
     /// Reports the scales of a model and the shape estimated with them.
     pub fn new(model: &ShapeModel, estimated: Option<&EstimatedShape>) -> Self {
+        let spacing_m = |scale: &Scale| match scale.functions {
+            Functions::Harmonics => None,
+            Functions::Lattice { columns, .. } => Some(model.spacing_m(columns)),
+        };
         let scale = |scale: &Scale| ScaleReport {
-            spacing_m: match scale.functions {
-                Functions::Harmonics => None,
-                Functions::Lattice { columns, .. } => Some(model.spacing_m(columns)),
-            },
+            spacing_m: spacing_m(scale),
             sigma_mm: 1e3 * scale.sigma_m,
+        };
+        let unseen = |scale: &Scale| UnseenScaleReport {
+            spacing_m: spacing_m(scale),
+            below_mm: 1e3 * scale.functions.rms() * scale.sigma_m,
         };
         let rms_mm = |values: &[f64]| {
             let known = values.iter().filter(|value| value.is_finite());
@@ -163,6 +192,7 @@ impl ShapeReport {
         };
         Self {
             scales: model.scales.iter().map(scale).collect(),
+            unseen: model.dropped.iter().map(unseen).collect(),
             rms_mm: estimated.map_or(0.0, |shape| rms_mm(shape.field.coefficients_m())),
             sigma_mm: estimated.map_or(0.0, |shape| rms_mm(&shape.sigma_m)),
         }
