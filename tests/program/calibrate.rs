@@ -81,7 +81,7 @@ fn everything_wrong_at_once_is_found_or_refused() {
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     simulate(
         &survey,
-        &["--frames", "30", "--size", "320x240", "--k1", "-0.05"],
+        &["--frames", "30", "--size", "240x180", "--k1", "-0.05"],
     );
     let truth = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
     change_camera(&survey, |camera| {
@@ -131,7 +131,7 @@ fn accurate_positions_determine_radius_and_axis() {
         "--frames",
         "36",
         "--size",
-        "320x240",
+        "240x180",
         "--jitter",
         "independent",
     ];
@@ -170,7 +170,7 @@ fn accurate_positions_determine_radius_and_axis() {
 fn two_frames_are_honest() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    simulate(&survey, &["--frames", "2", "--size", "320x240"]);
+    simulate(&survey, &["--frames", "2", "--size", "240x180"]);
     let truth = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
     scale_focal(&survey, 1.02);
     let unknowns = ["--fast", "--calibrate", "focal,centre,distortion"];

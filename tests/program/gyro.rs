@@ -67,7 +67,7 @@ fn gcsv(truth: &[Pose], title: &str) -> String {
 }
 
 fn simulated(survey: &Path) -> Vec<Pose> {
-    let options = ["--frames", "24", "--size", "320x240", "--seed", "3"];
+    let options = ["--frames", "24", "--size", "240x180", "--seed", "3"];
     simulate(survey, &options);
     poses_of(&tum::read(&survey.join("groundtruth.tum")).unwrap())
 }

@@ -158,7 +158,7 @@ fn simulate_and_refine(options: &[&str]) -> tempfile::TempDir {
 /// moving objects, 16 bits.
 #[test]
 fn uneven_light_highlights_and_moving_objects_do_no_harm() {
-    let light = "--frames 30 --size 320x240 --gain-percent 30 --bias-grey 5 --lamp-corner 0.4 \
+    let light = "--frames 30 --size 240x180 --gain-percent 30 --bias-grey 5 --lamp-corner 0.4 \
                  --specular-percent 3 --moving 2 --bits 16 --seed 4";
     let dir = simulate_and_refine(&light.split_whitespace().collect::<Vec<_>>());
     let px = photometric_wall_px(&dir.path().join("survey"), &dir.path().join("out"));
@@ -239,7 +239,7 @@ fn a_wrong_prior_costs_one_frame() {
 /// that is a tile off is photometric, and an ambiguous frame has both poses.
 #[test]
 fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
-    let options = "--wall tiled-brick --frames 24 --size 320x240 --seed 2 \
+    let options = "--wall tiled-brick --frames 24 --size 240x180 --seed 2 \
                    --rotation-sigma-deg 6 --translation-sigma-m 0.06,0.06,0.09";
     let dir = simulate_and_refine(&options.split_whitespace().collect::<Vec<_>>());
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
@@ -258,7 +258,7 @@ fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
 /// with every pair of frames consistent.
 #[test]
 fn a_turn_closes_on_the_right_tile() {
-    let options = "--wall tiled-brick --frames 60 --size 480x360 --seed 2 --jitter random-walk \
+    let options = "--wall tiled-brick --frames 60 --size 320x240 --seed 2 --jitter random-walk \
                    --rotation-sigma-deg 2 --translation-sigma-m 0.02,0.02,0.03";
     let dir = simulate_and_refine(&options.split_whitespace().collect::<Vec<_>>());
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
@@ -299,7 +299,7 @@ fn joint_estimation_of_the_wall_improves_bricks() {
 fn a_smooth_wall_is_refined_without_joint_estimation() {
     let dir = tempfile::tempdir().unwrap();
     let survey = dir.path().join("survey");
-    let concrete = ["--wall", "concrete", "--frames", "12", "--size", "320x240"];
+    let concrete = ["--wall", "concrete", "--frames", "12", "--size", "240x180"];
     simulate(&survey, &concrete);
     let refined = |name: &str, options: &[&str]| {
         let out = dir.path().join(name);

@@ -201,7 +201,7 @@ fn wait_for_a_state(child: &mut Child, folder: &Path) {
 #[test]
 fn an_interrupted_run_continues_and_another_is_refused() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = survey(dir.path(), 12, "320x240");
+    let survey = survey(dir.path(), 12, "240x180");
     let out = dir.path().join("refined");
     let kept = out.join("refine.unfinished");
     let arguments = ["refine", text(&survey), "--out", text(&out)];

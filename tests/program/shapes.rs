@@ -34,7 +34,7 @@ fn boxes_horseshoes_and_ellipses_are_refined_as_circles_are() {
         ["--shape", "ellipse", "--width-m", "5", "--height-m", "3.5"],
     ] {
         let dir = tempfile::tempdir().unwrap();
-        let size = "--frames 24 --size 320x240 --supersample 4".split(' ');
+        let size = "--frames 24 --size 240x180 --supersample 4".split(' ');
         let arguments: Vec<&str> = shape.iter().copied().chain(size).collect();
         let [refined, initial] = refined(dir.path(), &arguments);
         assert!(initial > 10.0, "{shape:?}: {initial} px before");
@@ -65,7 +65,7 @@ fn circling(pitch_m: f64) -> String {
 /// one: the errors match the stated uncertainty.
 #[test]
 fn a_tight_bend_is_refined_as_exactly_as_is_said() {
-    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&bend(), "320x240");
+    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&bend());
 }
 
 /// A winding line in a tunnel of varying width has no gauge freedom.
@@ -77,11 +77,11 @@ fn a_winding_tunnel_of_changing_radius_is_refined_as_exactly_as_is_said() {
         format!("{x} {y} 0 {}\n", 0.6 + 0.06 * (3.1 * y).sin())
     };
     let winding: String = (-6..50).map(point).collect();
-    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&winding, "240x180");
+    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&winding);
 }
 
 /// A tunnel of 0.6 m radius along a line.
-fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str, size: &str) {
+fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str) {
     let dir = tempfile::tempdir().unwrap();
     let line = dir.path().join("line.txt");
     std::fs::write(&line, points).unwrap();
@@ -95,7 +95,7 @@ fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str, size: &str) {
             "--frames",
             "24",
             "--size",
-            size,
+            "240x180",
             "--advance-m",
             "0.05",
             "--translation-sigma-m",

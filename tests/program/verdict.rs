@@ -18,7 +18,7 @@ fn poses(path: &Path) -> Vec<tunnelstitch::trajectory::StampedPose> {
 
 /// Simulates twelve frames, of which the sixth is black.
 fn simulate_with_a_black_frame(survey: &Path) {
-    let options = "--bad-frames 5:black --frames 12 --size 320x240";
+    let options = "--bad-frames 5:black --frames 12 --size 240x180";
     simulate(survey, &options.split(' ').collect::<Vec<_>>());
 }
 
@@ -30,7 +30,7 @@ fn a_diameter_given_for_the_radius_is_named() {
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     simulate(
         &survey,
-        &["--frames", "24", "--size", "320x240", "--seed", "3"],
+        &["--frames", "24", "--size", "240x180", "--seed", "3"],
     );
     edit(
         &survey.join("survey.toml"),
@@ -57,7 +57,7 @@ fn a_lens_that_is_not_exact_enlarges_sigma() {
     let survey = path("survey");
     simulate(
         &survey,
-        &["--frames", "36", "--size", "320x240", "--seed", "2"],
+        &["--frames", "36", "--size", "240x180", "--seed", "2"],
     );
     let camera = survey.join("camera.json");
     let mut calibration = json(&camera);

@@ -2,7 +2,9 @@
 
 use crate::model::context::{EstimationContext, total_displacement};
 use crate::parameters::shape::{Functions, Scale, Shape, ShapeModel};
+use crate::uncertainty::pixel_jacobians::PointJacobians;
 use crate::uncertainty::total_covariance::TotalCovariance;
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{RadialField, WallPoint};
@@ -118,18 +120,14 @@ impl EstimatedShape {
 
 /// Draws of the errors of a shape, as fields.
 fn error_draws(shape: &Shape, covariance: &TotalCovariance, first_slot: usize) -> Vec<RadialField> {
-    let errors = covariance.errors.as_ref();
-    let Some(draws) = errors.and_then(|errors| errors.of_all()) else {
-        return Vec::new();
-    };
-    let field = |draw: usize| {
+    let draws = covariance.error_draws(first_slot);
+    let fields = draws.par_map(|coefficients| {
         let drawn = Shape {
             model: shape.model.clone(),
-            coefficients: draws.of_slots(first_slot, draw),
+            coefficients: coefficients.clone(),
         };
         drawn.field()
-    };
-    let fields = (0..draws.count()).par_map(field);
+    });
     fields.into_iter().flatten().collect()
 }
 
@@ -156,9 +154,9 @@ fn sigma_at(
     first_slot: usize,
     wall: WallPoint,
 ) -> f64 {
-    covariance
-        .shape_variance(&model.functions_at(wall), first_slot)
-        .sqrt()
+    let mut displacement = PointJacobians::default();
+    displacement.add_shape(&Vector2::x(), &model.functions_at(wall), first_slot);
+    covariance.variance(&displacement).sqrt()
 }
 
 impl ShapeReport {

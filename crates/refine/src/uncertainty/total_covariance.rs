@@ -5,12 +5,10 @@ use crate::linear::bordered_system::{BorderBlock, SharedBlock};
 use crate::linear::normal_equations::Block;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameStep;
-use crate::parameters::shape::{FunctionValue, ShapeStep};
 use crate::uncertainty::covariance::{Covariances, NoiseCovariance};
-use crate::uncertainty::model_error::EstimateErrors;
+use crate::uncertainty::model_error::{ErrorDraws, EstimateErrors};
 use crate::uncertainty::pixel_jacobians::{KappaJacobian, PointJacobians};
 use nalgebra::Matrix6;
-use std::collections::BTreeMap;
 
 /// The covariance of the errors of all slots and of the shared parameters.
 pub struct TotalCovariance {
@@ -95,33 +93,20 @@ impl TotalCovariance {
         c * of_pixels + of_prior + of_shared + of_left
     }
 
-    /// Variance of the wall's displacement where the shape has the given `functions`, m²; `first`:
-    /// slot of its first block.
-    pub fn shape_variance(&self, functions: &[FunctionValue], first: usize) -> f64 {
-        self.variance_of(&by_slot(functions, first))
+    /// Draws of the errors of the slots from `first` on, by all causes; none if there is no shape,
+    /// or if the prior leaves a pose free.
+    ///
+    /// What is left of the solve is as likely an error one way as the other.
+    pub fn error_draws(&self, first: usize) -> Vec<Vec<FrameStep>> {
+        let draws = self.errors.as_ref().and_then(EstimateErrors::of_all);
+        let left = &self.left.0[first..];
+        let draw = |draws: &ErrorDraws, draw: usize| {
+            let sign = if draw.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let errors = draws.of_slots(first, draw).into_iter().zip(left);
+            errors.map(|(error, left)| error + left * sign).collect()
+        };
+        draws.map_or_else(Vec::new, |draws| {
+            (0..draws.count()).map(|k| draw(draws, k)).collect()
+        })
     }
-
-    /// Variance of `Σ φᵀ c` over blocks of the shape, by their slots.
-    fn variance_of(&self, blocks: &BTreeMap<usize, ShapeStep>) -> f64 {
-        let mut variance = 0.0;
-        for (n, (slot, phi)) in blocks.iter().enumerate() {
-            for (m, (other, phi_other)) in blocks.iter().enumerate().skip(n) {
-                if let Some(covariance) = self.block(*slot, *other) {
-                    let twice = if m == n { 1.0 } else { 2.0 };
-                    variance += twice * (phi.transpose() * covariance * phi_other)[0];
-                }
-            }
-        }
-        variance
-    }
-}
-
-/// Functions of a shape by the slot of their block, ascending.
-fn by_slot(functions: &[FunctionValue], first: usize) -> BTreeMap<usize, ShapeStep> {
-    let mut blocks: BTreeMap<usize, ShapeStep> = BTreeMap::new();
-    for function in functions {
-        let block = blocks.entry(first + function.block).or_default();
-        block[function.component] = function.value;
-    }
-    blocks
 }
