@@ -2,6 +2,7 @@
 
 use super::deformation::gather_deformation;
 use super::error::ReportError;
+use super::masked_wall::MaskedMap;
 use super::model::{
     Abscissa, FrameRow, Report, ResultSummary, SCHEMA_VERSION, SurveyFacts, WallMaps,
 };
@@ -71,6 +72,7 @@ pub fn gather(sources: Sources) -> Result<(Report, Pictures), ReportError> {
         panoramas,
         wall,
         deformation: gather_deformation(survey, &refined)?,
+        masked: refined.masked.as_ref().and_then(MaskedMap::new),
         thumbnails,
         refinement: refined.refinement,
     };

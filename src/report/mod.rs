@@ -15,6 +15,7 @@
 //! | --- | --- |
 //! | [`model`] | numbers of the report, computed by [`gather()`] |
 //! | [`deformation`] | deformation of the wall |
+//! | [`masked_wall`] | wall that was left out |
 //! | [`refined_files`] | files that refine has written |
 //! | [`pictures`] | strips of the panoramas, thumbnails |
 //! | [`resolution`] | resolution of the compared panoramas |
@@ -28,6 +29,7 @@ mod deformation;
 mod error;
 mod gather;
 mod heat_map;
+mod masked_wall;
 mod model;
 mod page;
 mod pictures;
@@ -39,6 +41,7 @@ mod ticks;
 pub use deformation::Deformation;
 pub use error::ReportError;
 pub use gather::{Sources, gather};
+pub use masked_wall::MaskedMap;
 pub use model::{
     Abscissa, FrameRow, PanoramaStrips, Report, ResultSummary, SCHEMA_VERSION, Strip, SurveyFacts,
     Thumbnail, WallMaps,

@@ -4,6 +4,7 @@
 //! poses, no covariance) are null or missing. Lists of frames are in the order of the survey.
 
 use super::deformation::Deformation;
+use super::masked_wall::MaskedMap;
 use super::refined_files::Refinement;
 use crate::evaluate::Comparison;
 use crate::render::Layout;
@@ -41,6 +42,9 @@ pub struct Report {
     /// Deformation of the wall; null if none was found.
     #[serde(default)]
     pub deformation: Option<Deformation>,
+    /// The wall that was left out; null if it is not known.
+    #[serde(default)]
+    pub masked: Option<MaskedMap>,
     /// Thumbnails of the first flagged frames.
     pub thumbnails: Vec<Thumbnail>,
     /// Report of refine; null for poses of another program.

@@ -3,9 +3,9 @@
 use super::error::ReportError;
 use crate::evaluate::deformation::{SectionDeformation, read_sections};
 use crate::refine::{
-    FrameReport, LevelReport, PriorTest, StageTime, SurveyVerdict, read_covariances,
+    FrameReport, LevelReport, MaskedReport, PriorTest, StageTime, SurveyVerdict, read_covariances,
 };
-use crate::survey::Survey;
+use crate::survey::{MASKED_FILE, MaskedWall, Survey};
 use crate::trajectory::{Pose, poses_of};
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
@@ -37,6 +37,9 @@ pub struct Refinement {
     /// The test of the prior.
     #[serde(default)]
     pub prior_test: PriorTest,
+    /// The wall that was left out; none in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub masked: Option<MaskedReport>,
     /// Self-calibration, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<Calibration>,
@@ -103,6 +106,8 @@ pub struct RefinedFiles {
     pub covariances: Option<Vec<Matrix6<f64>>>,
     /// Deformation of the wall's sections, if `sections.csv` exists.
     pub sections: Option<Vec<SectionDeformation>>,
+    /// The wall that was left out, if `masked.json` exists.
+    pub masked: Option<MaskedWall>,
 }
 
 impl RefinedFiles {
@@ -133,7 +138,10 @@ impl RefinedFiles {
         let refinement = beside(REFINEMENT_FILE).map(|path| read_refinement(&path, count));
         let covariances = beside(COVARIANCES).map(|path| read_covariances(&path, count));
         let sections = beside(SECTIONS_FILE).map(|path| read_section_file(&path));
+        let perimeter_m = survey.nominal.perimeter_m();
+        let masked = beside(MASKED_FILE).map(|path| MaskedWall::read(&path, perimeter_m));
         Ok(Self {
+            masked: masked.transpose()?,
             sections: sections.transpose()?,
             refinement: refinement.transpose()?,
             covariances: covariances.transpose()?,
@@ -149,6 +157,7 @@ impl RefinedFiles {
             beside(REFINEMENT_FILE, self.refinement.is_some()),
             beside(COVARIANCES, self.covariances.is_some()),
             beside(SECTIONS_FILE, self.sections.is_some()),
+            beside(MASKED_FILE, self.masked.is_some()),
         ];
         let poses = std::iter::once(self.path.clone());
         poses.chain(others.into_iter().flatten()).collect()

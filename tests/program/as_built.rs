@@ -1,6 +1,6 @@
 //! Walls that are not as drawn: their shape is estimated with the poses, and used by all commands.
 
-use crate::support::{edit, fail, json, simulate, succeed, text};
+use crate::support::{edit, fail, json, read_map, simulate, succeed, text};
 use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -230,20 +230,6 @@ fn the_deformation_is_a_map_and_a_part_of_the_report() {
         found["sections"].as_array().unwrap().len(),
         sections().len()
     );
-}
-
-/// Width and height, and the values of a map in single precision.
-fn read_map(path: &Path) -> ([usize; 2], Vec<f64>) {
-    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
-    let mut decoder = tiff::decoder::Decoder::new(file).unwrap();
-    let (width, height) = decoder.dimensions().unwrap();
-    match decoder.read_image().unwrap() {
-        tiff::decoder::DecodingResult::F32(values) => (
-            [width as usize, height as usize],
-            values.into_iter().map(f64::from).collect(),
-        ),
-        _ => panic!("{} is not of single precision", path.display()),
-    }
 }
 
 /// Pixels of a frame, located with the shape beside the poses, and pixels that show no wall.

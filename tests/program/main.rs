@@ -9,6 +9,7 @@ mod compare;
 mod config;
 mod converge;
 mod export;
+mod fittings;
 mod gyro;
 mod lenses;
 mod locate;

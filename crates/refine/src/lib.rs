@@ -92,6 +92,7 @@ pub use uncertainty::covariance::Covariances;
 pub use uncertainty::covariance_file::{CovarianceError, read_covariances};
 pub use uncertainty::cramer_rao::{FINER, PoseBounds, pose_bounds};
 pub use uncertainty::frame_sigma::FrameSigma;
+pub use uncertainty::masked_report::{MaskedPlace, MaskedReport};
 pub use uncertainty::model_error::ModelErrorReport;
 pub use uncertainty::rolling_shutter_test::ReadoutEstimate;
 pub use uncertainty::shape_report::{EstimatedShape, ScaleReport, ShapeReport, UnseenScaleReport};

@@ -3,6 +3,7 @@
 use crate::report::RefineReport;
 use crate::uncertainty::covariance::Covariances;
 use crate::uncertainty::shape_report::EstimatedShape;
+use tunnelstitch_core::survey::MaskedWall;
 use tunnelstitch_geometry::surface::Bend;
 use tunnelstitch_geometry::trajectory::Trajectory;
 
@@ -20,4 +21,7 @@ pub struct Refined {
     pub shape: Option<EstimatedShape>,
     /// Bend of a tunnel that was planned straight; None if it has none.
     pub bend: Option<Bend>,
+    /// The wall where frames show something else and were left out of the last solve; None if no
+    /// frame is photometric.
+    pub masked: Option<MaskedWall>,
 }

@@ -4,6 +4,7 @@ use crate::solver::solve_record::SolveRecord;
 use crate::uncertainty::bend_report::BendReport;
 use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::frame_sigma::FrameSigma;
+use crate::uncertainty::masked_report::MaskedReport;
 use crate::uncertainty::model_error::ModelErrorReport;
 use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::uncertainty::shape_report::ShapeReport;
@@ -134,6 +135,9 @@ pub struct RefineReport {
     /// The wall's shape, if it was estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<ShapeReport>,
+    /// The wall where frames show something else and were left out, if any frame is photometric.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub masked: Option<MaskedReport>,
     /// The bend of a tunnel that was planned straight, if it was found to have one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bend: Option<BendReport>,

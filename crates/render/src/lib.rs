@@ -70,7 +70,7 @@ pub use output::gaps::{Coverage, Gap, gaps_csv};
 pub use output::maps::Map;
 pub use output::panorama::Panorama;
 pub use output::panorama_files::{
-    CheckpointedFiles, DeformationAt, PanoramaFileOptions, PanoramaFiles,
+    CheckpointedFiles, DeformationAt, MaskedAt, PanoramaFileOptions, PanoramaFiles, WallProperties,
 };
 pub use output::plan::{Plan, Settled};
 pub use output::preview::Preview;

@@ -129,6 +129,14 @@ impl Scene {
         self.tunnel.deviation_m(theta, h_m)
     }
 
+    /// True if a cable or a lamp hides a point (world, metres) from a frame.
+    pub fn is_hidden(&self, frame: usize, x_w: &Vector3<f64>) -> bool {
+        let t = self.truth()[frame].t_wc;
+        let d = x_w - t;
+        let occluders = self.occluders(frame);
+        occluders.towards(&t, [d; 4]).grey(t, d).is_some()
+    }
+
     /// Gain and bias of a frame.
     pub fn exposure(&self, frame: usize) -> GainBias {
         GainBias::draw(&self.options, frame)

@@ -26,8 +26,9 @@ pub struct OutputArguments {
     /// shows), resolution.tif (mm of wall per pixel of that frame), uncertainty.tif (1-σ of the
     /// position on the wall, mm; needs --covariance), deformation.tif and deformation_sigma.tif
     /// (deviation of the wall from the best-fit circle of its section, outwards, and 1-σ, mm; if
-    /// refine has found that the wall is deformed), preview.png with chainage and clock positions,
-    /// gaps.csv.
+    /// refine has found that the wall is deformed), masked.tif (share of the frames that refine has
+    /// left out because they show something else than the wall, 0 to 1; from masked.json beside the
+    /// poses), preview.png with chainage and clock positions, gaps.csv.
     #[arg(long, value_name = "DIR")]
     maps: Option<PathBuf>,
     /// The covariance.csv that refine writes beside the poses

@@ -18,9 +18,10 @@ use std::sync::Arc;
 ///
 /// Reads SURVEY/survey.toml and writes into DIR: poses.tum (camera to world, for evo and other
 /// programs that read TUM), refine.json (costs, residuals, gains, 1-σ of every frame, timings) and
-/// covariance.csv (6 × 6 covariances of every frame and of neighbours); shape.json and sections.csv
-/// (best-fit circle, ovality, convergence chords along the tunnel, with 1-σ) if the wall deviates
-/// from the given shape. If the run is interrupted, the same command continues it.
+/// covariance.csv (6 × 6 covariances of every frame and of neighbours) and masked.json (wall where
+/// frames show something else and are left out); shape.json and sections.csv (best-fit circle,
+/// ovality, convergence chords along the tunnel, with 1-σ) if the wall deviates from the given
+/// shape. If the run is interrupted, the same command continues it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch refine my-survey --out refined\n  \
@@ -285,6 +286,14 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
     if let Some(none_above_mm) = none_above_mm {
         terminal.say(format!(
             "no deformation of the wall is seen; {none_above_mm:.2} mm (root mean square) would be"
+        ));
+    }
+    if let Some(masked) = report.masked.as_ref().filter(|masked| masked.area_m2 > 0.0) {
+        terminal.say(format!(
+            "most frames show something else than the wall on {:.2} m² ({:.2} %): left out, listed \
+             in {REFINEMENT_FILE}, drawn by stitch --maps",
+            masked.area_m2,
+            100.0 * masked.share
         ));
     }
     if report.calibration.is_some() {

@@ -11,7 +11,9 @@ use crate::progress::Progress;
 use crate::refine::{EstimatedShape, RefineOptions, RefineReport, Refined, refine_with_checkpoint};
 use crate::report::{REFINEMENT_FILE, SECTIONS_FILE};
 use crate::surface::Bend;
-use crate::survey::{FoundFiles, SURVEY_FILE, ShapeFile, Survey, SurveyFile};
+use crate::survey::{
+    FoundFiles, MASKED_FILE, MaskedWall, SURVEY_FILE, ShapeFile, Survey, SurveyFile,
+};
 use crate::trajectory::tum;
 use serde::Serialize;
 use std::path::Path;
@@ -77,8 +79,24 @@ pub fn refine_into(
         &out.join("covariance.csv"),
         &refined.covariances.csv(&sigmas),
     )?;
+    write_masked_wall(refined.masked.as_ref(), out)?;
     write_survey(survey, &refined, out)?;
     Ok((refined, json))
+}
+
+/// Writes the wall where frames were left out; removes that of an earlier run.
+fn write_masked_wall(masked: Option<&MaskedWall>, out: &Path) -> Result<(), Failure> {
+    let path = out.join(MASKED_FILE);
+    match masked {
+        // On one line: indented, each number of its tables would have its own.
+        Some(masked) => {
+            let text = serde_json::to_string(masked).map_err(|error| {
+                Failure::bug(format!("cannot make JSON of {MASKED_FILE}: {error}"))
+            })?;
+            Ok(atomic::write_text(&path, &(text + "\n"))?)
+        }
+        None => Ok(atomic::remove_file(&path)?),
+    }
 }
 
 /// Refuses to write what is found over the survey's own files.

@@ -10,11 +10,11 @@ use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::read_covariances;
 use crate::render::{
-    Budget, CheckpointedFiles, DeformationAt, FrameExposure, Gap, Layout, RenderOptions, Stitch,
-    StitchOptions,
+    Budget, CheckpointedFiles, DeformationAt, FrameExposure, Gap, Layout, MaskedAt, RenderOptions,
+    Stitch, StitchOptions, WallProperties,
 };
 use crate::surface::WallPoint;
-use crate::survey::Survey;
+use crate::survey::{MASKED_FILE, MaskedWall, Survey};
 use crate::trajectory::poses_of;
 use nalgebra::Matrix6;
 use serde::Serialize;
@@ -85,6 +85,7 @@ struct StitchRun<'a> {
     layout: Layout,
     covariances: Option<Vec<Matrix6<f64>>>,
     deformation: Option<DeviationMap>,
+    masked: Option<MaskedWall>,
     terminal: &'a Terminal,
 }
 
@@ -112,6 +113,7 @@ pub fn run(
         } else {
             None
         },
+        masked: read_masked_wall(arguments, &survey)?,
         terminal,
     };
     let mut stitch = Stitch::new(
@@ -227,13 +229,15 @@ impl StitchRun<'_> {
         let camera = &self.survey.camera;
         let deformation = self.deformation.as_ref();
         let deformation_at = deformation.map(|map| |wall: WallPoint| map.at_mm(wall));
-        let written = files.finish(
-            &plan,
-            &gaps,
-            camera,
-            self.covariances.as_deref(),
-            deformation_at.as_ref().map(|at| at as &DeformationAt),
-        );
+        let masked = self.masked.as_ref();
+        let masked_at = masked.map(|masked| {
+            |wall: WallPoint| masked.share_at(wall).map_or(f32::NAN, |share| share as f32)
+        });
+        let wall = WallProperties {
+            deformation: deformation_at.as_ref().map(|at| at as &DeformationAt),
+            masked: masked_at.as_ref().map(|at| at as &MaskedAt),
+        };
+        let written = files.finish(&plan, &gaps, camera, self.covariances.as_deref(), wall);
         terminal.finish();
         written?;
         let [width, height] = self.layout.size(&canvas);
@@ -291,6 +295,23 @@ fn print_summary(report: &StitchReport, terminal: &Terminal) {
             inner.len() - MAX_LISTED_GAPS
         ));
     }
+}
+
+/// Reads the wall that `refine` has left out and written beside the poses, for its map; None if it
+/// is not there.
+///
+/// # Errors
+/// A malformed file, or one of another tunnel.
+fn read_masked_wall(
+    arguments: &StitchArguments,
+    survey: &Survey,
+) -> Result<Option<MaskedWall>, Failure> {
+    let beside = (arguments.poses.file()).map(|file| file.with_file_name(MASKED_FILE));
+    let path = beside.filter(|path| arguments.output.has_maps() && path.is_file());
+    let perimeter_m = survey.nominal.perimeter_m();
+    Ok(path
+        .map(|path| MaskedWall::read(&path, perimeter_m))
+        .transpose()?)
 }
 
 /// Reads the covariances of the poses for the map of uncertainty: those of --covariance, else those

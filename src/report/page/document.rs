@@ -2,8 +2,8 @@
 
 use super::page_data::PageData;
 use super::{
-    convergence, corrections, deformation, errors, flagged, panorama, parameters, summary,
-    trajectory, wall_maps,
+    convergence, corrections, deformation, errors, flagged, masked_wall, panorama, parameters,
+    summary, trajectory, wall_maps,
 };
 use crate::report::error::ReportError;
 use crate::report::model::Report;
@@ -27,6 +27,7 @@ pub fn page(report: &Report, pictures: &Pictures) -> Result<String, ReportError>
             Some(wall_maps::section(&data)?),
         ),
         ("deformation", "Deformation", deformation::section(&data)?),
+        ("left-out", "Wall left out", masked_wall::section(&data)?),
         ("trajectory", "Trajectory", Some(trajectory::section(&data))),
         (
             "corrections",

@@ -11,6 +11,7 @@ mod document;
 mod errors;
 mod flagged;
 mod map_strip;
+mod masked_wall;
 mod page_data;
 mod panorama;
 mod parameters;

@@ -128,3 +128,17 @@ pub fn interrupt(arguments: &[&str], folder: &Path) -> Option<i32> {
 pub fn entries(folder: &Path) -> usize {
     std::fs::read_dir(folder).expect("a folder").count()
 }
+
+/// Width and height, and the values of a map in single precision.
+pub fn read_map(path: &Path) -> ([usize; 2], Vec<f64>) {
+    let file = std::io::BufReader::new(std::fs::File::open(path).expect("a map"));
+    let mut decoder = tiff::decoder::Decoder::new(file).expect("a map");
+    let (width, height) = decoder.dimensions().expect("a map");
+    match decoder.read_image().expect("a map") {
+        tiff::decoder::DecodingResult::F32(values) => (
+            [width as usize, height as usize],
+            values.into_iter().map(f64::from).collect(),
+        ),
+        _ => panic!("{} is not of single precision", path.display()),
+    }
+}

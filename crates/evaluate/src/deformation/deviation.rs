@@ -6,7 +6,7 @@ use super::outline::is_circle;
 use super::shape_estimate::ShapeEstimate;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
-use tunnelstitch_core::survey::{Survey, SurveyError};
+use tunnelstitch_core::survey::{MaskedWall, Survey, SurveyError};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{RadialField, Surface, WallPoint};
 
@@ -90,6 +90,8 @@ pub struct DeviationMap {
     /// Displacement `(a, x, z)` of the best-fit circle of each row; None where it is not
     /// determined.
     circles: Vec<Option<Vector3<f64>>>,
+    /// The wall that was left out: what frames show there is no deformation.
+    masked: Option<MaskedWall>,
 }
 
 /// Deviation at a point of the wall.
@@ -102,17 +104,26 @@ pub struct Deviation {
 }
 
 impl DeviationMap {
-    /// The map of a survey's wall; None if it has no displacement.
+    /// The map of a survey's wall, but for what was left out of it; None if it has no displacement.
     ///
     /// # Errors
-    /// A shape file that cannot be read.
+    /// A shape file, or a file of the masked wall beside it, that cannot be read.
     pub fn of_survey(survey: &Survey) -> Result<Option<Self>, SurveyError> {
         let file = survey.shape_file()?;
-        Ok(file.and_then(|file| {
+        let map = file.and_then(|file| {
             let field = file.displacement()?;
             let nominal = survey.nominal.as_ref();
             Some(Self::new(nominal, field, file.deviation_sigma_m))
-        }))
+        });
+        let Some(map) = map else {
+            return Ok(None);
+        };
+        Ok(Some(map.without(survey.masked_wall()?)))
+    }
+
+    /// The map without the places where half of the frames or more were left out.
+    pub fn without(self, masked: Option<MaskedWall>) -> Self {
+        Self { masked, ..self }
     }
 
     /// The map of a field over the nominal wall, with 1-σ at its nodes as [`deviation_sigmas_m`]
@@ -145,6 +156,7 @@ impl DeviationMap {
             field,
             sigmas_m,
             circles,
+            masked: None,
         }
     }
 
@@ -163,8 +175,12 @@ impl DeviationMap {
         *self.sigmas_m.get(row * columns + column % columns)?
     }
 
-    /// True where the nearest node is determined.
+    /// True where the nearest node is determined, and the wall was not left out.
     pub fn is_determined(&self, wall: WallPoint) -> bool {
+        let masked = self.masked.as_ref();
+        if masked.is_some_and(|masked| masked.is_hidden_at(wall)) {
+            return false;
+        }
         let [u, v] = self.position(wall);
         let columns = self.field.lattice().columns as i64;
         let column = (u.round() as i64).rem_euclid(columns) as usize;
@@ -246,5 +262,42 @@ impl DeviationMap {
             value_m: self.field.at(wall).delta_m - of_circle,
             sigma_m: sigma.0 / sigma.1,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tunnelstitch_core::survey::MaskedTile;
+    use tunnelstitch_geometry::surface::{Circle, SplineLattice};
+
+    /// No deviation is known where half of the frames were left out; beside it, where fewer were,
+    /// one is.
+    #[test]
+    fn what_was_left_out_is_no_deformation() {
+        let circle = Circle::new(3.0).unwrap();
+        let perimeter_m = circle.perimeter_m();
+        let lattice = SplineLattice {
+            perimeter_m,
+            columns: 16,
+            origin: WallPoint::default(),
+        };
+        let field = RadialField::new(lattice, -2, vec![0.01; 16 * 8]);
+        let tile = |column, left_out| MaskedTile {
+            row: 3,
+            column,
+            frames: 4,
+            left_out,
+        };
+        let tiles = vec![tile(10, 2), tile(11, 1)];
+        let masked = MaskedWall::new(perimeter_m, (180, 0.1), vec![(3, 0, 180)], tiles);
+        let map = DeviationMap::new(&circle, field, Vec::new());
+        let at = |map: &DeviationMap, column: f64| {
+            let s_m = column * perimeter_m / 180.0;
+            map.at(WallPoint { s_m, h_m: 0.35 }).is_some()
+        };
+        assert!(at(&map, 10.5) && at(&map, 11.5));
+        let map = map.without(Some(masked));
+        assert!(!at(&map, 10.5) && at(&map, 11.5));
     }
 }

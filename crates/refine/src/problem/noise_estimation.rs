@@ -5,6 +5,7 @@ use crate::joint::stiffness::StiffnessSums;
 use crate::model::context::FrameWindow;
 use crate::model::problem_error::ProblemError;
 use crate::problem::photometric_problem::PhotometricProblem;
+use crate::samples::excluded_tiles::ExcludedTiles;
 use crate::samples::observer::Observer;
 use crate::samples::outlier_mask::OutlierMask;
 use crate::samples::sampling::Sampling;
@@ -181,6 +182,7 @@ impl PhotometricProblem<'_> {
             }
         };
         let mut excluded = Vec::new();
+        let mut excluded_tiles = ExcludedTiles::default();
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch)?;
             if density.is_none() {
@@ -188,8 +190,11 @@ impl PhotometricProblem<'_> {
                 self.detect_outliers(stretch, &visibility, &mut mask)?;
             }
             let participants = self.coverage.frames(stretch);
-            excluded.push(mask.mark(&visibility, &self.grid, participants));
+            let marks = mask.mark(&visibility, &self.grid, participants);
+            excluded_tiles.add(&visibility, &marks);
+            excluded.push(marks);
         }
+        self.excluded_tiles = excluded_tiles;
         self.coverage.exclude(excluded);
         Ok(self)
     }

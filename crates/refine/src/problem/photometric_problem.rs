@@ -11,6 +11,7 @@ use crate::parameters::shape::Shape;
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::set_up::{min_density, normal_pattern, pixel_size_on_wall, pose_frames};
 use crate::problem::unknown_texture::UnknownTexture;
+use crate::samples::excluded_tiles::ExcludedTiles;
 use crate::samples::sampling::Sampling;
 use crate::samples::tile_coverage::{FrameImages, TileCoverage};
 use crate::samples::visibility::Exclusions;
@@ -21,6 +22,7 @@ use crate::tiles::residual_weighting::NoiseModel;
 use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::Pyramid;
+use tunnelstitch_core::survey::MaskedWall;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::surface::Surface;
 
@@ -55,6 +57,8 @@ pub struct PhotometricProblem<'a> {
     pub(super) rates: Vec<Sweep>,
     /// Observations of the samples.
     pub(super) coverage: TileCoverage<'a>,
+    /// Tiles that the outlier mask has excluded frames from.
+    pub(super) excluded_tiles: ExcludedTiles,
     /// The first active frame that is compared, counted from the first active one; the gauge is
     /// constrained there.
     pub(super) gauge_slot: Option<usize>,
@@ -154,6 +158,7 @@ impl<'a> PhotometricProblem<'a> {
             estimates: estimates.to_vec(),
             rates,
             coverage,
+            excluded_tiles: ExcludedTiles::default(),
             gauge_slot,
             compared: compared_frames,
             pattern,
@@ -291,6 +296,12 @@ impl<'a> PhotometricProblem<'a> {
     /// Share of the tiles that are selected, 0 to 1.
     pub fn compared_share(&self) -> f64 {
         self.coverage.tiles as f64 / self.coverage.all_tiles.max(1) as f64
+    }
+
+    /// The wall where the outlier mask has excluded frames, of the problem's lattice.
+    pub fn masked_wall(&self) -> MaskedWall {
+        let perimeter_m = self.context.surface.perimeter_m();
+        self.excluded_tiles.masked_wall(&self.grid, perimeter_m)
     }
 
     /// Height of a block of the wall ([`crate::tiles::grid::BLOCK`]), metres.

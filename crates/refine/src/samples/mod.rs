@@ -12,6 +12,7 @@
 //! [`sampling`] holds the settings of a problem. [`point_sampler`] projects single wall points and
 //! is used by tracking and validation.
 
+pub mod excluded_tiles;
 pub mod footprints;
 pub mod observer;
 pub mod observer_marks;

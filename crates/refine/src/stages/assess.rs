@@ -85,6 +85,7 @@ pub fn run<'a>(
         model_error: uncertainty.model_error,
         shape: shape_report,
         bend_sigma_per_m: bend_sigma_per_m(state, &uncertainty),
+        masked: Some(solution.problem.masked_wall()),
         calibration: report_calibration(setup, &calibration, &context.kappa, &uncertainty, state),
         timings: std::mem::take(&mut session.timings),
     };
@@ -114,6 +115,7 @@ pub fn without_solution(setup: &Setup, session: &mut Session) -> Refined {
         model_error: None,
         shape: None,
         bend_sigma_per_m: None,
+        masked: None,
         calibration: None,
         timings: std::mem::take(&mut session.timings),
     };

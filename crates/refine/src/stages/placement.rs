@@ -10,6 +10,7 @@ use crate::uncertainty::bend_report::BendReport;
 use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::covariance::Covariances;
 use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma};
+use crate::uncertainty::masked_report::MaskedReport;
 use crate::uncertainty::model_error::ModelErrorReport;
 use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::uncertainty::shape_report::{EstimatedShape, ShapeReport};
@@ -18,6 +19,7 @@ use crate::verdict::prior_test::PriorTest;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use nalgebra::{Matrix6, Vector3};
 use std::sync::Arc;
+use tunnelstitch_core::survey::MaskedWall;
 use tunnelstitch_geometry::surface::{Bend, GaugeMotion, Surface, WallPoint, bent};
 use tunnelstitch_geometry::trajectory::{Pose, StampedPose};
 
@@ -36,6 +38,8 @@ pub struct Placement {
     bend: Option<Bend>,
     /// The tunnel along it.
     nominal: Arc<dyn Surface>,
+    /// Displacement on the unrolled wall by the alignment, and the scale of the datum after it.
+    wall_motion: (WallPoint, f64),
 }
 
 /// Parts of the report that the poses do not determine.
@@ -54,6 +58,8 @@ pub struct ReportParts {
     pub shape: Option<ShapeReport>,
     /// 1-σ of the tunnel's curvature, 1/m, where it was found to bend.
     pub bend_sigma_per_m: Option<[f64; 2]>,
+    /// The wall where frames were left out, before the alignment; None if nothing was solved.
+    pub masked: Option<MaskedWall>,
     /// Self-calibration.
     pub calibration: Option<CalibrationReport>,
     /// Time by stage.
@@ -145,6 +151,7 @@ impl Placement {
             shape: shape.filter(|_| !is_kept),
             bend: datum.bend.filter(|_| !is_kept).or(setup.input.bend),
             nominal,
+            wall_motion: (by, datum.scale),
         }
     }
 
@@ -196,6 +203,9 @@ impl Placement {
             parts.model_error.as_ref(),
             contradiction.as_deref(),
         );
+        let (by, scale) = self.wall_motion;
+        let masked = parts.masked.filter(|_| !photometric.is_empty());
+        let masked = masked.map(|masked| masked.moved(by, scale));
         let poses = setup.input.initial.iter().zip(self.poses);
         let poses = poses.map(|(initial, pose)| StampedPose {
             time_s: initial.time_s,
@@ -214,6 +224,8 @@ impl Placement {
                 prior_test: self.prior_test,
                 verdict,
                 shape: parts.shape,
+                masked: (masked.as_ref())
+                    .map(|masked| MaskedReport::new(masked, self.nominal.as_ref(), scale)),
                 bend: (self.bend.zip(parts.bend_sigma_per_m))
                     .map(|(bend, sigma_per_m)| BendReport::new(bend, sigma_per_m)),
                 calibration: parts.calibration,
@@ -222,6 +234,7 @@ impl Placement {
             covariances: self.covariances,
             shape: self.shape,
             bend: self.bend,
+            masked,
         }
     }
 }

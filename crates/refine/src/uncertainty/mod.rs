@@ -17,6 +17,7 @@ pub mod covariance;
 pub mod covariance_file;
 pub mod cramer_rao;
 pub mod frame_sigma;
+pub mod masked_report;
 pub mod model_error;
 pub mod observability;
 pub mod overdispersion;

@@ -1,6 +1,6 @@
 //! Files of a panorama while it is drawn.
 
-use super::maps::{DeformationAt, MapFiles};
+use super::maps::{MapFiles, WallProperties};
 use super::state::{FilesState, STATE};
 use crate::compositing::band::{Band, Target};
 use crate::error::RenderError;
@@ -104,8 +104,7 @@ impl PanoramaFiles {
 
     /// Gives all files their names, the panorama last.
     ///
-    /// `camera` is that of the frames at full size, `covariances` those of their poses, and
-    /// `deformation` that of the wall, if known.
+    /// `camera` is that of the frames at full size, `covariances` those of their poses, if known.
     ///
     /// # Errors
     /// Whatever the system says.
@@ -115,10 +114,10 @@ impl PanoramaFiles {
         gaps: &[Gap],
         camera: &Camera,
         covariances: Option<&[Matrix6<f64>]>,
-        deformation: Option<&DeformationAt>,
+        wall: WallProperties,
     ) -> Result<(), RenderError> {
         if let Some(maps) = self.maps {
-            maps.finish(self.layout, plan, gaps, camera, covariances, deformation)?;
+            maps.finish(self.layout, plan, gaps, camera, covariances, wall)?;
         }
         if let Some(dzi) = self.dzi {
             dzi.finish()?;

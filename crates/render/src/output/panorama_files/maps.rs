@@ -1,5 +1,5 @@
-//! Maps beside a panorama: coverage, frames, resolution, uncertainty, deformation, preview and
-//! gaps.
+//! Maps beside a panorama: coverage, frames, resolution, uncertainty, deformation, masked wall,
+//! preview and gaps.
 
 use super::state::MapsState;
 use crate::compositing::band::Target;
@@ -26,23 +26,38 @@ const RESOLUTION: &str = "resolution.tif";
 const UNCERTAINTY: &str = "uncertainty.tif";
 const DEFORMATION: &str = "deformation.tif";
 const DEFORMATION_SIGMA: &str = "deformation_sigma.tif";
+const MASKED: &str = "masked.tif";
 const PREVIEW: &str = "preview.png";
 const GAPS: &str = "gaps.csv";
 
 /// Names of all maps.
-pub(super) const MAP_FILES: [&str; 8] = [
+pub(super) const MAP_FILES: [&str; 9] = [
     COVERAGE,
     FRAMES,
     RESOLUTION,
     UNCERTAINTY,
     DEFORMATION,
     DEFORMATION_SIGMA,
+    MASKED,
     PREVIEW,
     GAPS,
 ];
 
 /// Deformation of the wall at a point and its 1-σ, millimetres; NaN where they are not known.
 pub type DeformationAt<'d> = dyn Fn(WallPoint) -> [f32; 2] + Sync + 'd;
+
+/// Share of the frames that were left out at a point of the wall, 0 to 1; NaN where no two frames
+/// see it.
+pub type MaskedAt<'m> = dyn Fn(WallPoint) -> f32 + Sync + 'm;
+
+/// Properties of the wall that `refine` has found, by its points.
+#[derive(Clone, Copy, Default)]
+pub struct WallProperties<'w> {
+    /// The deformation, if the wall is deformed.
+    pub deformation: Option<&'w DeformationAt<'w>>,
+    /// The share of the frames that were left out, if it is known.
+    pub masked: Option<&'w MaskedAt<'w>>,
+}
 
 /// Maps that are being written.
 pub(super) struct MapFiles {
@@ -81,7 +96,7 @@ impl MapFiles {
         gaps: &[Gap],
         camera: &Camera,
         covariances: Option<&[Matrix6<f64>]>,
-        deformation: Option<&DeformationAt>,
+        wall: WallProperties,
     ) -> Result<(), RenderError> {
         let (surface, placements) = (plan.surface(), plan.placements());
         self.coverage.finish()?;
@@ -98,15 +113,19 @@ impl MapFiles {
             // A map of an earlier panorama would belong to other poses.
             atomic::remove_file(&uncertainty).map_err(RasterError::from)?;
         }
-        for (which, name) in [DEFORMATION, DEFORMATION_SIGMA].into_iter().enumerate() {
+        let write = |name: &str, map: Option<Map>| -> Result<(), RenderError> {
             let path = self.folder.join(name);
-            if let Some(deformation) = deformation {
-                let map = Map::of_wall(&grid, |wall| deformation(wall)[which]);
-                map.write(&path, layout)?;
-            } else {
-                atomic::remove_file(&path).map_err(RasterError::from)?;
+            match map {
+                Some(map) => map.write(&path, layout)?,
+                None => atomic::remove_file(&path).map_err(RasterError::from)?,
             }
+            Ok(())
+        };
+        for (which, name) in [DEFORMATION, DEFORMATION_SIGMA].into_iter().enumerate() {
+            let of_wall = |at: &DeformationAt| Map::of_wall(&grid, |wall| at(wall)[which]);
+            write(name, wall.deformation.map(of_wall))?;
         }
+        write(MASKED, wall.masked.map(|at| Map::of_wall(&grid, at)))?;
         let preview = DynamicImage::from(self.preview.picture(surface, layout, 0.0));
         write_picture(&self.folder.join(PREVIEW), &preview, PictureFormat::Png)
             .map_err(RasterError::from)?;

@@ -17,5 +17,5 @@ mod options;
 mod state;
 
 pub use files::{CheckpointedFiles, PanoramaFiles};
-pub use maps::DeformationAt;
+pub use maps::{DeformationAt, MaskedAt, WallProperties};
 pub use options::PanoramaFileOptions;
