@@ -216,6 +216,7 @@ impl Placement {
                 shape: parts.shape,
                 bend: (self.bend.zip(parts.bend_sigma_per_m))
                     .map(|(bend, sigma_per_m)| BendReport::new(bend, sigma_per_m)),
+                points: setup.wall.as_ref().map(|wall| wall.report.clone()),
                 calibration: parts.calibration,
                 timings: parts.timings,
             },
