@@ -3,7 +3,7 @@
 use super::error::ReportError;
 use crate::evaluate::deformation::{SectionDeformation, read_sections};
 use crate::refine::{
-    FrameReport, LevelReport, PriorTest, StageTime, SurveyVerdict, read_covariances,
+    FrameReport, LevelReport, PointsReport, PriorTest, StageTime, SurveyVerdict, read_covariances,
 };
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
@@ -37,6 +37,9 @@ pub struct Refinement {
     /// The test of the prior.
     #[serde(default)]
     pub prior_test: PriorTest,
+    /// Measured points of the wall, if there were any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<PointsReport>,
     /// Self-calibration, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<Calibration>,

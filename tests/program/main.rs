@@ -17,6 +17,7 @@ mod mutations;
 mod opencv;
 mod panorama;
 mod plan;
+mod points;
 mod poses;
 mod refine;
 mod report;
