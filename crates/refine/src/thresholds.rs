@@ -31,12 +31,12 @@ pub mod wall_points {
     ///
     /// Higher: points weigh more beside the pixels, and the fit takes more time.
     ///
-    /// Chosen by: neighbouring points of a scan err together, so that more of them tell hardly more;
-    /// 16 are four in every direction.
+    /// Chosen by: neighbouring points of a scan err together, so that more of them tell hardly
+    /// more; 16 are four in every direction.
     pub const MAX_POINTS_PER_CELL: usize = 16;
 
-    /// Distance of a point from the nominal wall beyond which it is not of the wall, of the distance
-    /// of the wall from the axis.
+    /// Distance of a point from the nominal wall beyond which it is not of the wall, of the
+    /// distance of the wall from the axis.
     ///
     /// Higher: a tunnel may bend more without a centreline; more equipment is left to the outliers.
     ///

@@ -9,8 +9,8 @@ pub fn normal_quantile(alpha: f64, tests: usize) -> f64 {
     Normal::standard().inverse_cdf(1.0 - rate)
 }
 
-/// [`normal_quantile`] of Student's t distribution, for variables whose σ is estimated with a number
-/// of degrees of freedom; infinite without any.
+/// [`normal_quantile`] of Student's t distribution, for variables whose σ is estimated with a
+/// number of degrees of freedom; infinite without any.
 pub fn student_quantile(alpha: f64, tests: usize, freedoms: f64) -> f64 {
     let rate = alpha / tests.max(1) as f64;
     // The quantile of 1 − rate would be lost in rounding.

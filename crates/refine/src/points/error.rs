@@ -52,8 +52,8 @@ pub enum PointsFitError {
     },
     /// The equations have no solution.
     #[error(
-        "{file}: the equations of the wall's shape have no solution; give more points, or points from \
-         all around the section"
+        "{file}: the equations of the wall's shape have no solution; give more points, or points \
+         from all around the section"
     )]
     Singular {
         /// The file.
