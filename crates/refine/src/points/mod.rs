@@ -3,7 +3,7 @@
 //! A scanner or a depth camera may have measured points of the wall, in the world of the poses.
 //! [`WallPoints`](wall_points::WallPoints) thins a file of them to some for every cell of the wall.
 //! [`crate::point_fit`] fits axis, section and displacement to these. What is left are
-//! [observations](observations) of the displacement, whose
+//! [`observations`] of the displacement, whose
 //! [normal equations](equations::PointEquations) stand beside those of the pixels in every solve.
 
 pub mod equations;
