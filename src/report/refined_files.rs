@@ -3,7 +3,8 @@
 use super::error::ReportError;
 use crate::evaluate::deformation::{SectionDeformation, read_sections};
 use crate::refine::{
-    FrameReport, LevelReport, MaskedReport, PriorTest, StageTime, SurveyVerdict, read_covariances,
+    FrameReport, LevelReport, MaskedReport, PointsReport, PriorTest, StageTime, SurveyVerdict,
+    read_covariances,
 };
 use crate::survey::{MASKED_FILE, MaskedWall, Survey};
 use crate::trajectory::{Pose, poses_of};
@@ -40,6 +41,9 @@ pub struct Refinement {
     /// The wall that was left out; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked: Option<MaskedReport>,
+    /// Measured points of the wall, if there were any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<PointsReport>,
     /// Self-calibration, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<Calibration>,

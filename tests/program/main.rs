@@ -18,6 +18,7 @@ mod mutations;
 mod opencv;
 mod panorama;
 mod plan;
+mod points;
 mod poses;
 mod refine;
 mod report;

@@ -38,8 +38,8 @@ fn start(arguments: &[&str]) -> Child {
 }
 
 /// Starts the command and kills it at random moments, at least until one run has continued another
-/// one, and then lets it end. Each run is given more time than the last: the machine may have become
-/// busier.
+/// one, and then lets it end. Each run is given more time than the last: the machine may have
+/// become busier.
 fn killed(arguments: &[&str], takes: Duration, seed: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut kills, mut resumed) = (0, 0);

@@ -10,6 +10,7 @@ pub mod bitmap_text;
 pub mod colour_map;
 pub mod frames;
 pub mod persist;
+pub mod points;
 pub mod progress;
 pub mod raster;
 pub mod super_resolve;

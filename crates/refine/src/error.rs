@@ -1,6 +1,7 @@
 //! Reasons why a survey cannot be refined.
 
 use crate::model::problem_error::ProblemError;
+use crate::points::error::PointsFitError;
 
 /// A reason why frames cannot be refined.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +37,18 @@ pub enum RefineError {
         /// The parameter that was to be estimated.
         unknown: &'static str,
     },
+    /// Something that measured points tell better than frames.
+    #[error(
+        "{unknown} is that of the measured points; leave it out of --calibrate and [calibrate] \
+         unknowns, or refine without points"
+    )]
+    GivenByPoints {
+        /// The parameter that was to be estimated.
+        unknown: &'static str,
+    },
+    /// Measured points that do not fit the wall.
+    #[error(transparent)]
+    Points(#[from] PointsFitError),
     /// The equations.
     #[error(transparent)]
     Problem(#[from] ProblemError),

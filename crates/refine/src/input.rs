@@ -1,5 +1,6 @@
 //! The input of a refinement: frames, camera, tunnel, poses and their noise model.
 
+use crate::points::wall_points::WallPoints;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameSet;
@@ -40,6 +41,12 @@ pub struct RefineInput<'a> {
     pub shape_sigma_m: f64,
     /// Radius of the tunnel, or half its width, as given; metres.
     pub nominal_radius_m: f64,
+    /// True if the initial poses are those in the tunnel as built: a bend that points show does not
+    /// carry them along.
+    pub as_built: bool,
+    /// Measured points of the wall. A [`Survey`] names their file; [`WallPoints::of_survey`] reads
+    /// it.
+    pub points: Option<&'a WallPoints>,
 }
 
 impl<'a> RefineInput<'a> {
@@ -67,6 +74,8 @@ impl<'a> RefineInput<'a> {
             shutter: Shutter::default(),
             ignored: &NOTHING,
             calibrate: CalibrateSection::default(),
+            as_built: false,
+            points: None,
         }
     }
 }
@@ -86,6 +95,8 @@ impl<'a> From<&'a Survey> for RefineInput<'a> {
             ignored: &survey.ignored,
             calibrate: survey.file.calibrate.clone().unwrap_or_default(),
             nominal_radius_m: survey.file.tunnel.nominal_m(),
+            as_built: survey.file.poses.as_built == Some(true),
+            points: None,
         }
     }
 }

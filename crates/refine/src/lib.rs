@@ -33,9 +33,12 @@
 //! | solve: sparse Cholesky, shared parameters by Schur complement | [`linear`] |
 //! | accept: damping, step test, stopping | [`solver::gauss_newton`] |
 //!
-//! Dependencies point downwards only, in the order parameters, linear, model, tiles, samples,
-//! joint, problem, solver, tracking, validation, uncertainty, verdict, stages, pipeline. Every
-//! tuned number is in [`thresholds`].
+//! Measured points of the wall, where there are any, are fitted first ([`point_fit`]): that wall is
+//! the start, and the equations of the points stand beside those of the pixels ([`points`]).
+//!
+//! Dependencies point downwards only, in the order parameters, linear, points, model, tiles,
+//! samples, joint, problem, solver, point_fit, tracking, validation, uncertainty, verdict, stages,
+//! pipeline. Every tuned number is in [`thresholds`].
 //!
 //! # Speed
 //!
@@ -60,6 +63,8 @@ mod model;
 mod options;
 mod parameters;
 mod pipeline;
+mod point_fit;
+mod points;
 mod pose_convention_search;
 mod problem;
 mod refined;
@@ -81,6 +86,9 @@ pub use input::RefineInput;
 pub use model::problem_error::ProblemError;
 pub use options::{RefineOptions, ShapeMode};
 pub use pipeline::{refine, refine_with_checkpoint};
+pub use point_fit::points_report::{PointsAxis, PointsReport, PointsSection};
+pub use points::error::PointsFitError;
+pub use points::wall_points::WallPoints;
 pub use pose_convention_search::search_pose_conventions;
 pub use problem::unknown_texture::UnknownTexture;
 pub use refined::Refined;

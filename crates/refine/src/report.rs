@@ -1,5 +1,6 @@
 //! `refine.json`: the report of a refinement.
 
+use crate::point_fit::points_report::PointsReport;
 use crate::solver::solve_record::SolveRecord;
 use crate::uncertainty::bend_report::BendReport;
 use crate::uncertainty::calibration_report::CalibrationReport;
@@ -141,6 +142,9 @@ pub struct RefineReport {
     /// The bend of a tunnel that was planned straight, if it was found to have one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bend: Option<BendReport>,
+    /// Measured points of the wall, if there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub points: Option<PointsReport>,
     /// Self-calibration, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,

@@ -47,6 +47,7 @@ pub fn test_context<'a>(
         nominal: std::sync::Arc::new(wall.circle),
         displacement: None,
         shape: None,
+        points: None,
         surface: std::sync::Arc::new(wall.circle),
         ignored: &NO_PATCHES,
         camera: wall.camera,

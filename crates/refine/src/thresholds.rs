@@ -25,6 +25,25 @@ pub mod prescreening {
     pub const MAX_REPEAT_DIFFERENCE_GREY: f64 = 0.1;
 }
 
+/// Thresholds of `points/wall_points.rs`.
+pub mod wall_points {
+    /// Measured points that are kept of a cell of the wall, whose side is a 64th of the perimeter.
+    ///
+    /// Higher: points weigh more beside the pixels, and the fit takes more time.
+    ///
+    /// Chosen by: neighbouring points of a scan err together, so that more of them tell hardly
+    /// more; 16 are four in every direction.
+    pub const MAX_POINTS_PER_CELL: usize = 16;
+
+    /// Distance of a point from the nominal wall beyond which it is not of the wall, of the
+    /// distance of the wall from the axis.
+    ///
+    /// Higher: a tunnel may bend more without a centreline; more equipment is left to the outliers.
+    ///
+    /// Chosen by: linings deviate by a hundredth; what bends by more needs its centreline.
+    pub const MAX_OFF_WALL_SHARE: f64 = 0.25;
+}
+
 /// Thresholds of `tracking/*.rs`, and of `solver/neighbourhood.rs`.
 pub mod tracking {
     /// Number of frames in a long window, and of those around a changed frame that are solved

@@ -136,12 +136,22 @@ impl From<AssociateArgument> for Associate {
 }
 
 impl PoseReadingArguments {
-    /// Opens a survey, its poses read according to the flags, and prints its warnings.
+    /// Opens a survey, its poses read according to the flags, with the file of measured points
+    /// `points` instead of its own, if there is one, and prints its warnings.
     ///
     /// # Errors
     /// Everything that can be wrong with the survey.
-    pub fn open(&self, survey: &Path, terminal: &Terminal) -> Result<Survey, Failure> {
-        Ok(warned(self.open_quietly(survey)?, terminal))
+    pub fn open(
+        &self,
+        survey: &Path,
+        points: Option<&Path>,
+        terminal: &Terminal,
+    ) -> Result<Survey, Failure> {
+        let opened = Survey::open_with(survey, |file| {
+            self.apply_to(file);
+            replace(&mut file.tunnel.points, points.map(absolute));
+        })?;
+        Ok(warned(opened, terminal))
     }
 
     /// Opens a survey, its poses read according to the flags, and prints nothing.

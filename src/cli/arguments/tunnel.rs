@@ -59,6 +59,7 @@ impl TunnelArguments {
             height_m: self.height_m,
             centreline: self.centreline.clone(),
             shape_file: None,
+            points: None,
             shape_sigma_mm: None,
             ignore: Vec::new(),
         }

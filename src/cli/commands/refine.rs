@@ -51,6 +51,12 @@ pub struct RefineArguments {
     /// it, as far as the frames show it, and writes shape.json; fixed takes both as given.
     #[arg(long, value_name = "MODE", value_enum, default_value_t = ShapeArgument::Auto)]
     shape: ShapeArgument,
+    /// Points of the wall that a scanner or a depth camera has measured, in the world of the
+    /// initial poses, metres: .ply, .las, .laz, .pcd, or text with x y z in each line. The wall is
+    /// fitted to them, robustly: frames refine that shape (with --shape fixed, they take it as it
+    /// is). Instead of tunnel.points of survey.toml.
+    #[arg(long, value_name = "FILE")]
+    points: Option<PathBuf>,
     /// Largest number of Gauss–Newton iterations of each global solve.
     #[arg(
         long,
@@ -150,7 +156,8 @@ pub fn run(
     terminal: &Arc<Terminal>,
 ) -> Result<(), Failure> {
     let options = arguments.options();
-    let survey = arguments.reading.open(&arguments.survey, terminal)?;
+    let points = arguments.points.as_deref();
+    let survey = (arguments.reading).open(&arguments.survey, points, terminal)?;
     let inputs = record::hash_survey(&survey, None)?;
     let origin = resume::origin(&survey, &options, inputs.clone())?;
     let say = |text: &str| {
@@ -263,6 +270,9 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
         poses.display(),
         arguments.out.join(REFINEMENT_FILE).display()
     ));
+    if let Some(points) = &report.points {
+        terminal.say(points.sentence());
+    }
     if let Some(bend) = &report.bend {
         terminal.say(format!(
             "the tunnel bends towards {:.0}° with a radius of {:.0} ± {:.0} m (1-σ); poses and \

@@ -8,7 +8,10 @@ use crate::evaluate::deformation::{
 use crate::persist::atomic;
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
-use crate::refine::{EstimatedShape, RefineOptions, RefineReport, Refined, refine_with_checkpoint};
+use crate::refine::{
+    EstimatedShape, RefineInput, RefineOptions, RefineReport, Refined, WallPoints,
+    refine_with_checkpoint,
+};
 use crate::report::{REFINEMENT_FILE, SECTIONS_FILE};
 use crate::surface::Bend;
 use crate::survey::{
@@ -58,7 +61,12 @@ pub fn refine_into(
     atomic::create_folder(out)?;
     refuse_survey_folder(&survey.folder, out)?;
     let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
-    let refined = refine_with_checkpoint(survey, options, checkpoint, &progress)?;
+    let points = WallPoints::of_survey(survey)?;
+    let input = RefineInput {
+        points: points.as_ref(),
+        ..RefineInput::from(survey)
+    };
+    let refined = refine_with_checkpoint(input, options, checkpoint, &progress)?;
     let json = json::text(&RefineFile {
         program: PROGRAM,
         command: &record.arguments,

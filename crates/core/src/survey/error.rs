@@ -1,6 +1,7 @@
 //! Errors of surveys.
 
 use crate::frames::FrameError;
+use crate::points::PointsError;
 use std::path::PathBuf;
 use tunnelstitch_geometry::camera::CalibrationError;
 use tunnelstitch_geometry::surface::SurfaceError;
@@ -41,6 +42,9 @@ pub enum SurveyError {
         /// The value and its valid range.
         what: String,
     },
+    /// Measured points cannot be read.
+    #[error(transparent)]
+    Points(#[from] PointsError),
     /// The numbers of frames and poses differ.
     #[error(
         "{}: {poses} poses for {frames} frames; every frame needs exactly one pose, in the order \

@@ -43,6 +43,7 @@ impl SurveyFile {
         [
             self.tunnel.centreline.as_mut(),
             self.tunnel.shape_file.as_mut(),
+            self.tunnel.points.as_mut(),
             Some(&mut self.camera.file),
             self.frames.times.as_mut(),
             self.frames.mask.as_mut(),
@@ -179,6 +180,7 @@ mod tests {
                 height_m: Some(3.0),
                 centreline: Some("curve.txt".into()),
                 shape_file: None,
+                points: None,
                 shape_sigma_mm: None,
                 ignore: vec![IgnoreSection {
                     theta_deg: Some([150.0, 210.0]),

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
 use tunnelstitch_geometry::surface::{Bend, RadialField, Surface, WallRegions, bent, displaced};
 use tunnelstitch_geometry::trajectory::{
-    Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of,
+    Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of, read_tunnel_frame,
 };
 
 /// A survey, read and validated, except the pixels.
@@ -320,6 +320,16 @@ impl Survey {
         let path = path.filter(|path| path.is_file());
         path.map(|path| MaskedWall::read(&path, self.nominal.perimeter_m()))
             .transpose()
+    }
+
+    /// Reads the tunnel's frame in the world of the initial poses; None if they are the same.
+    ///
+    /// # Errors
+    /// A file that has become unreadable since the survey was opened.
+    pub fn tunnel_in_world(&self) -> Result<Option<Pose>, SurveyError> {
+        let file = self.file.poses.tunnel_frame.as_ref();
+        let read = |file: &PathBuf| read_tunnel_frame(&self.folder.join(file));
+        Ok(file.map(read).transpose()?)
     }
 
     /// The initial poses without their times.

@@ -57,6 +57,10 @@ pub struct TunnelSection {
     /// that of a real lining, a 300th of the radius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape_sigma_mm: Option<f64>,
+    /// A file of measured points of the wall, in the world of the poses
+    /// ([`crate::points::read_points`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<PathBuf>,
     /// Regions of the wall that are excluded from the comparison of frames: water, plants, moving
     /// objects.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -74,6 +78,7 @@ impl TunnelSection {
             centreline: None,
             shape_file: None,
             shape_sigma_mm: None,
+            points: None,
             ignore: Vec::new(),
         }
     }
@@ -262,6 +267,7 @@ mod tests {
             centreline: None,
             shape_file: None,
             shape_sigma_mm: None,
+            points: None,
             ignore: Vec::new(),
         };
         let surface = |tunnel: TunnelSection| {

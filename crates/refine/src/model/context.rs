@@ -4,6 +4,7 @@ use crate::model::prior::{Prior, predict};
 use crate::parameters::calibration::{Calibration, Kappa};
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::parameters::shape::Shape;
+use crate::points::observations::PointObservations;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
@@ -25,6 +26,8 @@ pub struct EstimationContext<'a> {
     pub displacement: Option<&'a RadialField>,
     /// Its further displacement, if it is to be estimated.
     pub shape: Option<Arc<Shape>>,
+    /// Measured points, as observations of that.
+    pub points: Option<Arc<PointObservations>>,
     /// The wall: with its shape, at the start of a solve.
     pub surface: Arc<dyn Surface>,
     /// Parts of the wall where frames are not compared.

@@ -1,6 +1,6 @@
 //! Quantiles for tests whose false-alarm rates add up to one of the whole survey.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 
 /// The one-sided quantile z of the standard normal distribution that `tests` independent tests
 /// exceed with the probability `alpha` at the most (Bonferroni).
@@ -9,8 +9,8 @@ pub fn normal_quantile(alpha: f64, tests: usize) -> f64 {
     Normal::standard().inverse_cdf(1.0 - rate)
 }
 
-/// [`normal_quantile`] of Student's t distribution, for variables whose σ is estimated with a number
-/// of degrees of freedom; infinite without any.
+/// [`normal_quantile`] of Student's t distribution, for variables whose σ is estimated with a
+/// number of degrees of freedom; infinite without any.
 pub fn student_quantile(alpha: f64, tests: usize, freedoms: f64) -> f64 {
     let rate = alpha / tests.max(1) as f64;
     // The quantile of 1 − rate would be lost in rounding.
@@ -24,6 +24,13 @@ pub fn chi_squared_bounds(alpha: f64, freedoms: f64) -> Option<(f64, f64)> {
     let chi_squared = ChiSquared::new(freedoms).ok()?;
     let bound = |probability| chi_squared.inverse_cdf(probability);
     Some((bound(0.5 * alpha), bound(1.0 - 0.5 * alpha)))
+}
+
+/// The value that an F variable with `freedoms` (numerator) and `freedoms_below` degrees of freedom
+/// exceeds with the probability `alpha`; None without freedoms.
+pub fn f_bound(alpha: f64, freedoms: f64, freedoms_below: f64) -> Option<f64> {
+    let f = FisherSnedecor::new(freedoms, freedoms_below).ok()?;
+    Some(f.inverse_cdf(1.0 - alpha))
 }
 
 #[cfg(test)]
@@ -41,5 +48,7 @@ mod tests {
         let (low, high) = chi_squared_bounds(0.05, 10.0).unwrap();
         assert!((low - 3.246_973).abs() < 1e-3 && (high - 20.483_177).abs() < 1e-3);
         assert!(chi_squared_bounds(0.05, 0.0).is_none());
+        assert!((f_bound(0.05, 2.0, 10.0).unwrap() - 4.102_821).abs() < 1e-3);
+        assert!(f_bound(0.05, 2.0, 0.0).is_none());
     }
 }

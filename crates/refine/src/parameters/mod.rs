@@ -12,4 +12,5 @@
 pub mod calibration;
 pub mod frame_estimate;
 pub mod shape;
+pub mod shape_limits;
 pub mod unknowns;

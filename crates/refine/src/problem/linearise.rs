@@ -12,6 +12,7 @@ use crate::problem::linearisation::{FrameContribution, Linearisation};
 use crate::problem::photometric_problem::PhotometricProblem;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::Gauge;
 
 /// Blocks of tiles that are processed before their sums are added: bounds the memory, whatever the
 /// tunnel's length.
@@ -51,6 +52,7 @@ impl PhotometricProblem<'_> {
         self.add_pixels(unknowns, &camera, &mut sums)?;
         self.scale_by_noise(&mut sums);
         sums.cost += self.add_prior(unknowns, &mut sums.normal, sums.border.as_mut());
+        sums.cost += self.add_points(&unknowns.shape, &mut sums.normal);
         if let Some(border) = &mut sums.border {
             sums.cost +=
                 calibration.prior_cost(kappa) - self.log_volume_slope() * kappa[RADIUS_INDEX];
@@ -59,7 +61,8 @@ impl PhotometricProblem<'_> {
         }
         if self.held_frame_count() == 0 {
             let slot = self.gauge_slot.unwrap_or(0);
-            self.constrain_gauge(slot, &unknowns.frames[slot], &mut sums.normal);
+            let gauge = self.context.gauge();
+            self.constrain_gauge(slot, &unknowns.frames[slot], &gauge, &mut sums.normal);
         }
         Ok(sums)
     }
@@ -170,6 +173,21 @@ impl PhotometricProblem<'_> {
         }
     }
 
+    /// Normal matrix and border of all that is not pixels, at the given unknowns: the prior, and
+    /// measured points.
+    pub fn other_information(&self, unknowns: &Unknowns) -> (Vec<Block>, SharedBorder) {
+        let (blocks, border) = self.prior_information(unknowns);
+        let Some(points) = &self.points else {
+            return (blocks, border);
+        };
+        let mut normal = NormalEquations {
+            blocks,
+            ..NormalEquations::zeros(&self.pattern)
+        };
+        points.add_information(&self.pattern, self.active.len(), &mut normal);
+        (normal.blocks, border)
+    }
+
     /// Normal matrix and border of the prior alone, at the given unknowns.
     pub fn prior_information(&self, unknowns: &Unknowns) -> (Vec<Block>, SharedBorder) {
         let mut normal = NormalEquations::zeros(&self.pattern);
@@ -215,17 +233,42 @@ impl PhotometricProblem<'_> {
         cost
     }
 
+    /// Adds the equations of measured points and returns their cost.
+    fn add_points(&self, blocks: &[ShapeStep], normal: &mut NormalEquations) -> f64 {
+        let first = self.active.len();
+        let points = self.points.as_ref();
+        points.map_or(0.0, |points| {
+            points.add_to(blocks, &self.pattern, first, normal)
+        })
+    }
+
+    /// Stiffens the first compared frame along the gauge of the given wall, if measured points have
+    /// left it free.
+    pub fn tie_gauge(&self, frames: &[FrameEstimate], normal: &mut NormalEquations) {
+        if self.context.points.is_some() && self.held_frame_count() == 0 {
+            let slot = self.gauge_slot.unwrap_or(0);
+            let gauge = self.context.planned.gauge();
+            self.constrain_gauge(slot, &frames[slot], &gauge, normal);
+        }
+    }
+
     /// Stiffens the first compared frame along the gauge, where pixels give no information and
     /// rounding would determine the step.
     ///
     /// Cost and gradient do not change: the position along the gauge follows in closed form from
     /// the prior ([`crate::model::prior::Prior::align_gauge`]).
-    fn constrain_gauge(&self, slot: usize, first: &FrameEstimate, normal: &mut NormalEquations) {
+    fn constrain_gauge(
+        &self,
+        slot: usize,
+        first: &FrameEstimate,
+        gauge: &Gauge,
+        normal: &mut NormalEquations,
+    ) {
         let Some(index) = self.pattern.block_index(slot, slot) else {
             return;
         };
         let pose_block = normal.blocks[index].fixed_view::<6, 6>(0, 0).into_owned();
-        for direction in self.context.gauge().directions(&first.pose) {
+        for direction in gauge.directions(&first.pose) {
             let stiffness = (direction.transpose() * pose_block * direction)[0]
                 / direction.norm_squared().powi(2);
             let constraint =

@@ -9,6 +9,7 @@ use crate::parameters::calibration::{BEND_INDEX, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use crate::parameters::shape::Shape;
 use crate::parameters::unknowns::Unknowns;
+use crate::points::equations::PointEquations;
 use crate::problem::set_up::{min_density, normal_pattern, pixel_size_on_wall, pose_frames};
 use crate::problem::unknown_texture::UnknownTexture;
 use crate::samples::excluded_tiles::ExcludedTiles;
@@ -85,6 +86,8 @@ pub struct PhotometricProblem<'a> {
     pub(super) estimates_shared: bool,
     /// The wall's shape, if it is estimated.
     pub(super) shape: Option<Arc<Shape>>,
+    /// Equations of measured points in its coefficients.
+    pub(super) points: Option<Arc<PointEquations>>,
 }
 
 impl<'a> PhotometricProblem<'a> {
@@ -142,7 +145,11 @@ impl<'a> PhotometricProblem<'a> {
         )?;
         let shape = context.shape.clone().filter(|_| sampling.shape);
         let frames = (participants.start, &active);
-        let pattern = normal_pattern(context, &coverage, &grid, frames, shape.as_deref())?;
+        let points = shape.as_deref().zip(context.points.as_ref());
+        let points = points
+            .map(|(shape, points)| Arc::new(PointEquations::new(Arc::clone(points), &shape.model)));
+        let of_shape = shape.as_deref().map(|shape| (shape, points.as_deref()));
+        let pattern = normal_pattern(context, &coverage, &grid, frames, of_shape)?;
         let symbolic =
             SymbolicFactorisation::new(&pattern).map_err(|source| ProblemError::Factor {
                 first: active.start,
@@ -176,6 +183,7 @@ impl<'a> PhotometricProblem<'a> {
             unknown_texture: None,
             estimates_shared: false,
             shape,
+            points,
         };
         problem.estimate_noise()?;
         if sampling.joint {
@@ -270,6 +278,11 @@ impl<'a> PhotometricProblem<'a> {
     /// The shape that is estimated, at its initial values.
     pub fn shape(&self) -> Option<&Shape> {
         self.shape.as_deref()
+    }
+
+    /// Equations of measured points in the coefficients of the shape, if there are any.
+    pub fn points(&self) -> Option<&PointEquations> {
+        self.points.as_deref()
     }
 
     /// The block pattern of the normal matrix.
@@ -405,6 +418,7 @@ impl<'a> PhotometricProblem<'a> {
     /// Number of degrees of freedom of the poses that the gauge constraint removes.
     pub fn constrained_gauge_freedoms(&self) -> usize {
         match self.held_frame_count() {
+            0 if self.context.points.is_some() => self.context.planned.gauge().degrees_of_freedom(),
             0 => self.context.gauge().degrees_of_freedom(),
             _ => 0,
         }

@@ -4,6 +4,7 @@ use crate::linear::normal_equations::Pattern;
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
 use crate::parameters::shape::{FunctionValue, Shape};
+use crate::points::equations::PointEquations;
 use crate::samples::footprints::{MAX_VIEWING_DISTANCE_RADII, footprint};
 use crate::samples::tile_coverage::TileCoverage;
 use crate::samples::visibility::PosedFrame;
@@ -50,8 +51,8 @@ pub fn pose_frames(
 
 /// Sparsity pattern of the `active` frames among participants that are counted from frame `first`,
 /// and of the blocks of the shape behind them: frames that observe common tiles or have a common
-/// prior, blocks with functions in a common block of the wall, and those with the frames that
-/// observe it.
+/// prior, blocks with functions in a common block of the wall or at a common measured point, and
+/// those with the frames that observe it.
 ///
 /// # Errors
 /// [`FrameError`] if an image that the selection of tiles needs cannot be read.
@@ -60,7 +61,7 @@ pub fn normal_pattern(
     coverage: &TileCoverage,
     grid: &WallGrid,
     (first, active): (usize, &Range<usize>),
-    shape: Option<&Shape>,
+    shape: Option<(&Shape, Option<&PointEquations>)>,
 ) -> Result<Pattern, FrameError> {
     let slot = |k: usize| {
         let frame = first + k;
@@ -70,9 +71,11 @@ pub fn normal_pattern(
     let covisible = covisible.filter_map(|(a, b)| slot(*a).zip(slot(*b)));
     let mut pairs: HashSet<(usize, usize)> = covisible.collect();
     pairs.extend(context.prior.pairs(active));
-    let Some(Shape { model, .. }) = shape else {
+    let Some((Shape { model, .. }, points)) = shape else {
         return Ok(Pattern::new(active.len(), pairs));
     };
+    let of_points = points.into_iter().flat_map(PointEquations::pairs);
+    pairs.extend(of_points.map(|(a, b)| (active.len() + a, active.len() + b)));
     for stretch in 0..coverage.len() {
         let visibility = coverage.visibility(stretch)?;
         for tiles in &visibility.blocks {

@@ -50,6 +50,14 @@ pub fn footprint(
     .map_err(|source| ProblemError::Placement { frame, source })
 }
 
+/// Chainages between which some footprints lie, metres.
+pub fn extent_h_m(footprints: &[Footprint]) -> [f64; 2] {
+    let nothing = [f64::INFINITY, f64::NEG_INFINITY];
+    footprints.iter().fold(nothing, |[from, to], one| {
+        [from.min(one.h_min_m), to.max(one.h_max_m)]
+    })
+}
+
 /// Footprint of each frame at its current pose.
 ///
 /// # Errors

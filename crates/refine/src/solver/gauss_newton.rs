@@ -42,6 +42,14 @@ pub struct Solution<'a> {
 }
 
 impl Solution<'_> {
+    /// Ties the first frame along the gauge of the given wall where measured points have left it
+    /// free. Frames and points agree about it only as well as the initial poses and the shape tell;
+    /// covariances are against the first frame.
+    pub fn tie_gauge(&mut self) {
+        let normal = &mut self.linearisation.normal;
+        self.problem.tie_gauge(&self.linearised_at.frames, normal);
+    }
+
     /// Removes the shared parameters from the equations that are tested only.
     pub fn remove_tested(&mut self) {
         let at = &mut self.linearisation;

@@ -93,17 +93,21 @@ pub fn learn_shape<'s>(
 }
 
 /// The equations of all unknowns at a solution.
-struct ShapeEquations<'s> {
-    pattern: &'s Pattern,
-    symbolic: &'s SymbolicFactorisation,
-    normal: &'s NormalEquations,
-    border: Option<&'s SharedBorder>,
+pub struct ShapeEquations<'s> {
+    /// Pattern of the normal matrix.
+    pub pattern: &'s Pattern,
+    /// Its symbolic factorisation.
+    pub symbolic: &'s SymbolicFactorisation,
+    /// The normal equations, with the prior of the shape for the strengths of the solve.
+    pub normal: &'s NormalEquations,
+    /// Those of the shared parameters.
+    pub border: Option<&'s SharedBorder>,
     /// True if the unknowns are taken for the minimum, whatever the gradient there.
-    is_minimum: bool,
+    pub is_minimum: bool,
     /// The shape there, with the strengths of the solve.
-    shape: Shape,
+    pub shape: Shape,
     /// Slot of its first block.
-    first_slot: usize,
+    pub first_slot: usize,
 }
 
 /// The minimum of the quadratic cost for some strengths.
@@ -132,8 +136,9 @@ impl<'s> ShapeEquations<'s> {
         ranges.map(|range| range.start + self.first_slot..range.end + self.first_slot)
     }
 
-    /// Learns the strengths, and drops scales of no use.
-    fn learn(self, most_m: f64, alpha: f64) -> Option<LearnedShape<'s>> {
+    /// Learns the strengths, and drops scales of no use ([`learn_shape`]); None if the equations
+    /// are singular.
+    pub fn learn(self, most_m: f64, alpha: f64) -> Option<LearnedShape<'s>> {
         let scales = &self.shape.model.scales;
         let mut sigmas_m = self.sigmas_m();
         let mut dropped = vec![false; scales.len()];
@@ -323,6 +328,25 @@ impl LearnedShape<'_> {
         limits.into_iter().flatten().collect()
     }
 
+    /// Step of all slots to the minimum.
+    pub fn step(&self) -> &[FrameStep] {
+        &self.minimum.step
+    }
+
+    /// Number of coefficients that the data determine, without mean, cos θ and sin θ of sections.
+    pub fn determined(&self) -> Option<f64> {
+        let equations = &self.equations;
+        let mut determined = 0.0;
+        for (k, slots) in equations.slots().enumerate() {
+            if !self.dropped[k] {
+                let functions = &equations.shape.model.scales[k].functions;
+                let trace = equations.trace(&self.minimum, &slots, functions)?;
+                determined += functions.deformations() as f64 - trace / self.sigmas_m[k].powi(2);
+            }
+        }
+        Some(determined)
+    }
+
     /// The shape after a step of all slots, without the dropped scales.
     pub fn shape_after(&self, step: &[FrameStep]) -> Shape {
         let before = &self.equations.shape;
@@ -392,7 +416,7 @@ mod tests {
                 "{dropped:?}"
             );
         }
-        let learned = learned.shape_after(&learned.minimum.step);
+        let learned = learned.shape_after(learned.step());
         let scales = &learned.model.scales;
         assert_eq!(scales.len(), 1, "{scales:?}");
         assert!((scales[0].sigma_m / 0.005 - 1.0).abs() < 0.15, "{scales:?}");

@@ -50,13 +50,18 @@ pub fn run<'a>(
     judge(setup, &solution, &sigmas, &mut rejections);
     let calibration = setup.calibration_at(state);
     let datum = calibration.datum(&context.kappa);
-    let shape = EstimatedShape::new(
-        &context,
-        state.shape.as_ref(),
-        uncertainty.total.as_ref(),
-        setup.count(),
-    );
-    let model = state.shape.as_ref().map(|shape| &shape.model);
+    let held = setup.wall.as_ref().filter(|_| state.shape.is_none());
+    let shape = match held {
+        Some(wall) => EstimatedShape::held(&context, &wall.shape.model, wall.error_draws.clone()),
+        None => EstimatedShape::new(
+            &context,
+            state.shape.as_ref(),
+            uncertainty.total.as_ref(),
+            setup.count(),
+        ),
+    };
+    let shape_of = state.shape.as_ref().or(held.map(|wall| &wall.shape));
+    let model = shape_of.map(|shape| &shape.model);
     let shape_report = model.map(|model| ShapeReport::new(model, shape.as_ref()));
     let placement = Placement::new(
         setup,
@@ -84,7 +89,7 @@ pub fn run<'a>(
         rolling_shutter: readout,
         model_error: uncertainty.model_error,
         shape: shape_report,
-        bend_sigma_per_m: bend_sigma_per_m(state, &uncertainty),
+        bend_sigma_per_m: bend_sigma_per_m(setup, state, &uncertainty),
         masked: Some(solution.problem.masked_wall()),
         calibration: report_calibration(setup, &calibration, &context.kappa, &uncertainty, state),
         timings: std::mem::take(&mut session.timings),
@@ -181,11 +186,16 @@ fn judge(
     }
 }
 
-/// 1-σ of the curvature, 1/m, if it was estimated.
+/// 1-σ of the curvature, 1/m, if it was estimated, from frames or from points.
 fn bend_sigma_per_m(
+    setup: &Setup,
     state: &PipelineState,
     uncertainty: &SolutionUncertainty,
 ) -> Option<[f64; BEND_PARAMETERS]> {
+    let wall = setup.wall.as_ref();
+    if let Some((_, sigma_per_m)) = wall.and_then(|wall| wall.bend) {
+        return Some(sigma_per_m);
+    }
     let covariance = uncertainty.shared.filter(|_| state.free[BEND_INDEX])?;
     Some(std::array::from_fn(|k| {
         covariance[(BEND_INDEX + k, BEND_INDEX + k)].sqrt()

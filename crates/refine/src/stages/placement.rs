@@ -228,6 +228,7 @@ impl Placement {
                     .map(|masked| MaskedReport::new(masked, self.nominal.as_ref(), scale)),
                 bend: (self.bend.zip(parts.bend_sigma_per_m))
                     .map(|(bend, sigma_per_m)| BendReport::new(bend, sigma_per_m)),
+                points: setup.wall.as_ref().map(|wall| wall.report.clone()),
                 calibration: parts.calibration,
                 timings: parts.timings,
             },

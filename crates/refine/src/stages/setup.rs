@@ -3,22 +3,25 @@
 
 use crate::error::RefineError;
 use crate::input::RefineInput;
-use crate::model::context::EstimationContext;
+use crate::model::context::{EstimationContext, total_displacement};
+use crate::model::frame_states::FrameStates;
 use crate::model::prior::{Prior, median_step_s};
 use crate::options::{RefineOptions, ShapeMode};
 use crate::parameters::calibration::{
     BEND_INDEX, BEND_PARAMETERS, Calibration, DATUM_PARAMETERS, INTRINSIC_PARAMETERS, Kappa,
+    RADIUS_INDEX,
 };
+use crate::parameters::frame_estimate::FrameEstimate;
+use crate::parameters::shape_limits::BEND_RADIUS_RADII;
+use crate::point_fit::fit::{FittedWall, PointFit};
+use crate::points::wall_points::WallPoints;
+use crate::samples::footprints::{extent_h_m, footprints};
 use crate::stages::state::PipelineState;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
-use tunnelstitch_core::survey::CalibrationGroup;
-use tunnelstitch_geometry::surface::displaced;
+use tunnelstitch_core::survey::{CalibrationGroup, DEFAULT_SHAPE_SIGMA_RADII};
+use tunnelstitch_geometry::surface::{RadialField, bent, displaced};
 use tunnelstitch_geometry::trajectory::{Pose, poses_of};
-
-/// Radius of the bend that a tunnel may have which is planned straight, 1-σ of the curvature, in
-/// multiples of its own radius: 90 m for one of 3 m.
-const BEND_RADIUS_RADII: f64 = 30.0;
 
 /// The input and the options of a refinement, with what follows from both.
 pub struct Setup<'a> {
@@ -37,13 +40,21 @@ pub struct Setup<'a> {
     pub calibration: Calibration,
     /// 1-σ of the wall's deviation from its nominal shape, metres; 0 if it is exact.
     pub shape_sigma_m: f64,
+    /// Known displacement of the wall, beyond which its shape is estimated: that of the input, with
+    /// size and axis by measured points.
+    pub displacement: Option<RadialField>,
+    /// The displacement of the wall until its shape is estimated: with the fit to measured points.
+    pub held_displacement: Option<RadialField>,
+    /// The wall that fits measured points, if there are any.
+    pub wall: Option<FittedWall>,
 }
 
 impl<'a> Setup<'a> {
     /// Prepares a refinement.
     ///
     /// # Errors
-    /// [`RefineError::SingleFrame`], [`RefineError::PoseCount`], [`RefineError::OnlyRound`].
+    /// [`RefineError::SingleFrame`], [`RefineError::PoseCount`], [`RefineError::OnlyRound`],
+    /// [`RefineError::GivenByPoints`], [`RefineError::Points`].
     pub fn new(input: RefineInput<'a>, options: &'a RefineOptions) -> Result<Self, RefineError> {
         if input.frames.len() < 2 {
             return Err(RefineError::SingleFrame);
@@ -77,7 +88,10 @@ impl<'a> Setup<'a> {
             ShapeMode::Estimated => input.shape_sigma_m,
             ShapeMode::Fixed => 0.0,
         };
-        Ok(Self {
+        let mut setup = Self {
+            displacement: input.displacement.cloned(),
+            held_displacement: input.displacement.cloned(),
+            wall: None,
             input,
             options,
             shape_sigma_m,
@@ -85,7 +99,62 @@ impl<'a> Setup<'a> {
             prior,
             tracking_prior,
             calibration,
-        })
+        };
+        if let Some(points) = setup.input.points {
+            setup.fit_wall(points)?;
+        }
+        Ok(setup)
+    }
+
+    /// Fits the wall to measured points, and takes over its bend and its displacement.
+    ///
+    /// # Errors
+    /// [`RefineError::GivenByPoints`], [`RefineError::Points`]; an initial pose outside the tunnel.
+    fn fit_wall(&mut self, points: &WallPoints) -> Result<(), RefineError> {
+        let free = &self.calibration.free;
+        for (k, unknown) in [(RADIUS_INDEX, "the radius"), (RADIUS_INDEX + 1, "the axis")] {
+            if free[k] {
+                return Err(RefineError::GivenByPoints { unknown });
+            }
+        }
+        let initial = self.prior.initial.iter();
+        let frames = FrameStates {
+            estimates: initial.map(|pose| FrameEstimate::at(*pose)).collect(),
+            rejections: vec![None; self.count()],
+            kappa: Kappa::zeros(),
+        };
+        let [from, to] = extent_h_m(&footprints(&self.initial_context(0.0), &frames)?);
+        let radius_m = self.input.nominal_radius_m;
+        let wall = PointFit {
+            points,
+            planned: &self.input.surface,
+            known: self.displacement.as_ref(),
+            may_bend: self.may_bend(),
+            middle_h_m: self.calibration.middle_h_m,
+            extent_h_m: [from - radius_m, to + radius_m],
+            shape_sigma_m: match self.input.shape_sigma_m {
+                0.0 => DEFAULT_SHAPE_SIGMA_RADII * radius_m,
+                given_m => given_m,
+            },
+            radius_m,
+            alpha: self.options.false_alarm_rate,
+        }
+        .run()?;
+        if let Some((bend, _)) = wall.bend {
+            self.input.surface = bent(&self.input.surface, Some(bend));
+            self.input.bend = Some(bend);
+            if !self.input.as_built {
+                for prior in [&mut self.prior, &mut self.tracking_prior] {
+                    let initial = prior.initial.iter_mut();
+                    initial.for_each(|pose| *pose = bend.bent(pose));
+                }
+            }
+        }
+        let displacement = &wall.displacement;
+        self.held_displacement = total_displacement(Some(displacement), wall.shape.field());
+        self.displacement = Some(displacement.clone());
+        self.wall = Some(wall);
+        Ok(())
     }
 
     /// Number of frames.
@@ -118,14 +187,15 @@ impl<'a> Setup<'a> {
     /// grey levels.
     pub fn initial_context(&self, noise: f64) -> EstimationContext<'_> {
         let planned = Arc::clone(&self.input.surface);
-        let surface = displaced(&planned, self.input.displacement.cloned());
+        let displacement = self.held_displacement.as_ref();
         EstimationContext {
+            surface: displaced(&planned, displacement.cloned()),
             nominal: Arc::clone(&planned),
             planned,
-            is_deviation_known: self.input.bend.is_some() || self.input.displacement.is_some(),
-            displacement: self.input.displacement,
+            is_deviation_known: self.input.bend.is_some() || displacement.is_some(),
+            displacement,
             shape: None,
-            surface,
+            points: (self.wall.as_ref()).map(|wall| Arc::clone(&wall.observations)),
             ignored: self.input.ignored,
             camera: self.input.camera,
             shutter: &self.input.shutter,
@@ -140,21 +210,26 @@ impl<'a> Setup<'a> {
 
     /// The estimation context with shared parameters and shape as `state` has them.
     pub fn context(&self, state: &PipelineState) -> EstimationContext<'_> {
+        let initial = self.initial_context(state.noise);
         EstimationContext {
+            displacement: match &state.shape {
+                Some(_) => self.displacement.as_ref(),
+                None => initial.displacement,
+            },
             shape: state.shape.clone().map(Arc::new),
             calibration: self.calibration_at(state),
             dispersion: state.dispersion,
-            ..self.initial_context(state.noise)
+            ..initial
         }
         .at(state.kappa)
     }
 
     /// True if a curvature can be estimated: if the tunnel is planned straight, and nothing else
-    /// is asked for that says where its axis is.
+    /// is asked for or was measured that says where its axis is.
     pub fn may_bend(&self) -> bool {
         let datum = INTRINSIC_PARAMETERS..INTRINSIC_PARAMETERS + DATUM_PARAMETERS;
         let is_straight = self.input.surface.gauge().shift && self.input.bend.is_none();
-        is_straight && !self.calibration.free[datum].contains(&true)
+        is_straight && self.wall.is_none() && !self.calibration.free[datum].contains(&true)
     }
 
     /// Replaces the shared parameters of a state, and carries its frames along with the curvature.

@@ -8,7 +8,10 @@ use crate::parameters::calibration::{
     BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa, SHARED_PARAMETERS,
 };
 use crate::parameters::shape::{Shape, ShapeModel, ShapeStep};
-use crate::samples::footprints::footprints;
+use crate::parameters::shape_limits::{
+    FIRST_FINEST_COLUMNS, MAX_PRIOR_SIGMAS, MAX_STRENGTH_SIGMAS, with_finer_lattice,
+};
+use crate::samples::footprints::{extent_h_m, footprints};
 use crate::solver::gauss_newton::Solution;
 use crate::solver::shape_evidence::{LearnedShape, learn_shape};
 use crate::stages::setup::Setup;
@@ -19,22 +22,9 @@ use std::ops::Range;
 const LENS: Range<usize> = 0..INTRINSIC_PARAMETERS;
 /// The curvature in κ.
 const BEND: Range<usize> = BEND_INDEX..BEND_INDEX + BEND_PARAMETERS;
-/// Columns of the finest lattice before anything is known: nodes a fifth of the radius apart.
-const FIRST_FINEST_COLUMNS: usize = 32;
-/// Columns of the finest lattice at the most: nodes a tenth of the radius apart. Twice as many
-/// would cost eight times the time.
-const MAX_COLUMNS: usize = 64;
-/// Coefficient beyond which a shape is not believed, 1-σ of the prior: a thirtieth of the radius,
-/// if the survey does not say how exact the wall is.
-const MAX_PRIOR_SIGMAS: f64 = 10.0;
-/// Largest strength of a scale, 1-σ of the prior. The residuals of a wall that is not smooth would
-/// be explained by shapes that pixels hardly see.
-const MAX_STRENGTH_SIGMAS: f64 = 3.0;
 /// Rate at which a scale of no use is kept until the last solve, which sees more than the ones
 /// before.
 const KEPT_RATE: f64 = 0.3;
-/// Strength of a finer lattice over that of the one before, before it is learned.
-const FINER_STRENGTH: f64 = 0.5;
 /// Factor by which a strength may change without a new solve; the estimate hardly depends on it.
 const MAX_STRENGTH_CHANGE: f64 = 1.3;
 
@@ -47,10 +37,10 @@ pub fn begin(setup: &Setup, state: &mut PipelineState) -> Result<(), ProblemErro
         return Ok(());
     }
     let context = setup.context(state);
-    let footprints = footprints(&context, &state.frames)?.into_iter();
-    let extent = footprints.fold([f64::INFINITY, f64::NEG_INFINITY], |[from, to], one| {
-        [from.min(one.h_min_m), to.max(one.h_max_m)]
-    });
+    let extent = match &setup.wall {
+        Some(wall) => wall.shape.model.extent_h_m(),
+        None => extent_h_m(&footprints(&context, &state.frames)?),
+    };
     let perimeter_m = context.nominal.perimeter_m();
     let known = context.displacement.map(|field| field.lattice().origin);
     let model = ShapeModel::new(
@@ -60,7 +50,10 @@ pub fn begin(setup: &Setup, state: &mut PipelineState) -> Result<(), ProblemErro
         FIRST_FINEST_COLUMNS,
         setup.shape_sigma_m,
     );
-    state.shape = Some(Shape::nominal(model));
+    state.shape = Some(match &setup.wall {
+        Some(wall) => wall.start(model),
+        None => Shape::nominal(model),
+    });
     state.free[..INTRINSIC_PARAMETERS].fill(true);
     state.free[BEND].fill(setup.may_bend());
     Ok(())
@@ -78,7 +71,7 @@ pub fn take_over(setup: &Setup, state: &mut PipelineState, solution: &Solution) 
 }
 
 /// Adopts a shape. One far beyond its prior means that something else is wrong: then the wall and
-/// the lens are those given.
+/// the lens are those given, or the wall that fits measured points.
 fn adopt(setup: &Setup, state: &mut PipelineState, mut shape: Shape) {
     let most_m = MAX_PRIOR_SIGMAS * setup.shape_sigma_m;
     let is_plausible = |block: &ShapeStep| (0.0..=most_m).contains(&block.amax());
@@ -86,6 +79,9 @@ fn adopt(setup: &Setup, state: &mut PipelineState, mut shape: Shape) {
         shape.model.scales.clear();
         shape.model.dropped.clear();
         shape.coefficients.clear();
+        if let Some(wall) = &setup.wall {
+            shape.clone_from(&wall.shape);
+        }
         fix_shared(setup, state);
     }
     state.shape = Some(shape);
@@ -172,23 +168,6 @@ fn is_changed<const N: usize>(
     let square = change.dot(&of_change.solve(&change));
     let bounds = chi_squared_bounds(2.0 * options.false_alarm_rate, N as f64);
     bounds.is_some_and(|(_, most)| square > most)
-}
-
-/// The shape with a lattice of half the spacing added, if its finest lattice is still of use.
-fn with_finer_lattice(shape: Shape) -> Shape {
-    let finest = shape.model.finest_lattice();
-    match finest.filter(|(columns, _)| 2 * columns <= MAX_COLUMNS) {
-        Some((columns, sigma_m)) if columns >= FIRST_FINEST_COLUMNS => {
-            let model = shape.model.refined(FINER_STRENGTH * sigma_m);
-            let mut coefficients = shape.coefficients;
-            coefficients.resize(model.blocks(), ShapeStep::zeros());
-            Shape {
-                model,
-                coefficients,
-            }
-        }
-        _ => shape,
-    }
 }
 
 /// True if scales come or go, or change their strength.

@@ -57,6 +57,7 @@ pub fn run<'a>(
         plan_again(&plan, setup.options, state);
     }
     solution.remove_tested();
+    solution.tie_gauge();
     let uncertainty = uncertainty_of(&plan, setup, &context, state, &solution)?;
     let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
     let mut kappa = state.kappa;

@@ -116,6 +116,7 @@ pub fn pose_bounds(
         nominal: std::sync::Arc::clone(&survey.nominal),
         displacement: survey.displacement.as_ref(),
         shape: None,
+        points: None,
         surface: std::sync::Arc::clone(&survey.surface),
         ignored: &survey.ignored,
         camera,

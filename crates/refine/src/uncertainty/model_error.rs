@@ -16,6 +16,8 @@
 //! `Σ = (H⁻¹ (V_P/κ² + P) H⁻¹)_pp`,
 //!
 //! in every direction what errors of this size, and those of the initial poses, do to the estimate.
+//! Measured points of the wall ([`crate::points`]) add their information to P, and their noise to
+//! what is drawn.
 //!
 //! It is not sparse. But for independent random signs ε, `z = Σ_p ε_p g_p/κ` has the covariance
 //! `V_P/κ²`, a normal vector times the Cholesky factor of P has the covariance P, and `δ = H⁻¹ z`
@@ -42,6 +44,7 @@ use crate::model::problem_error::ProblemError;
 use crate::model::significance::normal_quantile;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+use crate::points::equations::PointEquations;
 use crate::problem::patch_scores::PatchScores;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::gauss_newton::Solution;
@@ -128,6 +131,7 @@ impl EstimateErrors {
                 posterior,
                 scores,
                 prior: &prior,
+                points: problem.points(),
                 curvature,
             };
             system.draw(pattern.columns(), frames)
@@ -248,6 +252,8 @@ struct System<'s> {
     posterior: Option<&'s Posterior>,
     scores: &'s PatchScores,
     prior: &'s PriorRoot,
+    /// Measured points, whose noise adds to that of the prior.
+    points: Option<&'s PointEquations>,
     /// κ.
     curvature: f64,
 }
@@ -310,6 +316,9 @@ impl System<'_> {
         };
         let quadratic = product(&z, &of_pixels) - product(&exposures_alone, &of_exposures);
         self.prior.add_draws(&mut z, &mut rng);
+        if let Some(points) = self.points {
+            points.add_draws(&mut z[frames..], &mut rng);
+        }
         let mut steps = self.factor.solve(&z);
         let shared = self.posterior.map_or(SharedBatch::zeros(), |posterior| {
             posterior.steps_of_shared(&z, &z_shared)

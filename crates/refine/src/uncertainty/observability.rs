@@ -55,7 +55,7 @@ impl Posterior {
         let pattern = problem.pattern();
         let factor = problem.symbolic().factorise(pattern, &at.normal, 0.0)?;
         let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
-        let (prior, prior_border) = problem.prior_information(&solution.unknowns);
+        let (prior, prior_border) = problem.other_information(&solution.unknowns);
         let scatter = (reduce_to_shared(pattern, &at.scatter, border_scatter, &w)
             + reduce_to_shared(pattern, &prior, &prior_border, &w))
             / solution.record.curvature().powi(2);

@@ -103,6 +103,31 @@ impl EstimatedShape {
         })
     }
 
+    /// The displacement of a context whose shape was held, with draws of its errors; `model`: its
+    /// functions. None if there is none.
+    pub fn held(
+        context: &EstimationContext,
+        model: &ShapeModel,
+        error_draws: Vec<RadialField>,
+    ) -> Option<Self> {
+        let field = context.displacement?.clone();
+        let (rows, lattice) = (field.rows(), *field.lattice());
+        let sigma_m = (0..field.coefficients_m().len()).par_map(|k| {
+            let row = rows.start + (k / lattice.columns) as i64;
+            let node = lattice.node(row, k % lattice.columns);
+            let square = |draw: &RadialField| draw.at(node).delta_m.powi(2);
+            let sum: f64 = error_draws.iter().map(square).sum();
+            (sum / error_draws.len() as f64).sqrt()
+        });
+        Some(Self {
+            sigma_m,
+            error_draws,
+            prior_sigma_m: prior_sigma_m(model, &field),
+            extent_h_m: Some(model.extent_h_m()),
+            field,
+        })
+    }
+
     /// The shape moved on the unrolled wall and scaled with all of it.
     pub fn moved(self, by: WallPoint, scale: f64) -> Self {
         let moved = |field: RadialField| field.moved(by).scaled(scale);

@@ -56,7 +56,7 @@ impl SolutionUncertainty {
         let posterior = Posterior::at(solution).map_err(|source| problem.factor_error(source))?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
-        let (prior, _) = problem.prior_information(&solution.unknowns);
+        let (prior, _) = problem.other_information(&solution.unknowns);
         let of_noise = compute_covariances(
             problem.pattern(),
             frames,

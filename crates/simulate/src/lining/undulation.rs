@@ -2,9 +2,9 @@
 //!
 //! The deviation at the angle θ and the chainage h is `a cos 2(θ − θ_0) + u(θ, h)`, with the
 //! undulation u a sum of [`WAVES`] cosines of random phase. Their wave numbers are drawn from the
-//! spectrum of a Gaussian correlation `exp(−x²/2ℓ²)`, of which u is a sample. They are whole numbers
-//! of waves around the section and in [`PERIOD_LENGTHS`] ℓ along the axis, so u is tabulated once
-//! and has no ends.
+//! spectrum of a Gaussian correlation `exp(−x²/2ℓ²)`, of which u is a sample. They are whole
+//! numbers of waves around the section and in [`PERIOD_LENGTHS`] ℓ along the axis, so u is
+//! tabulated once and has no ends.
 //!
 //! Source: M. Shinozuka, C.-M. Jan, "Digital simulation of random processes and its applications",
 //! Journal of Sound and Vibration 25(1), 1972.
