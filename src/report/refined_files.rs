@@ -3,8 +3,8 @@
 use super::error::ReportError;
 use crate::evaluate::deformation::{SectionDeformation, read_sections};
 use crate::refine::{
-    FrameReport, LevelReport, MaskedReport, PointsReport, PriorTest, StageTime, SurveyVerdict,
-    read_covariances,
+    FrameReport, LengthScale, LevelReport, MaskedReport, PointsReport, PriorTest, StageTime,
+    SurveyVerdict, read_covariances,
 };
 use crate::survey::{MASKED_FILE, MaskedWall, Survey};
 use crate::trajectory::{Pose, poses_of};
@@ -38,6 +38,9 @@ pub struct Refinement {
     /// The test of the prior.
     #[serde(default)]
     pub prior_test: PriorTest,
+    /// How sure all lengths are; none in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale: Option<LengthScale>,
     /// The wall that was left out; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked: Option<MaskedReport>,

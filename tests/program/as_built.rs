@@ -288,6 +288,7 @@ fn a_bend_that_is_declared_straight_is_found() {
     let report = json(&out.join("refine.json"));
     assert_eq!(report["frames_on_prior"], 0);
     assert_eq!(report["shape"]["scales"], serde_json::json!([]));
+    assert_eq!(report["scale"]["radius"], "given");
     let unseen = report["shape"]["unseen"].as_array().unwrap();
     assert_eq!(unseen.len(), 4, "{unseen:?}");
     for scale in unseen {

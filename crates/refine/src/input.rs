@@ -39,6 +39,8 @@ pub struct RefineInput<'a> {
     pub displacement: Option<&'a RadialField>,
     /// 1-σ of the wall's deviation from its shape, metres; 0 if it is exact.
     pub shape_sigma_m: f64,
+    /// Relative 1-σ of the radius, and with it of all lengths; 0 if it is exact.
+    pub radius_sigma: f64,
     /// Radius of the tunnel, or half its width, as given; metres.
     pub nominal_radius_m: f64,
     /// True if the initial poses are those in the tunnel as built: a bend that points show does not
@@ -66,6 +68,7 @@ impl<'a> RefineInput<'a> {
             bend: None,
             displacement: None,
             shape_sigma_m: DEFAULT_SHAPE_SIGMA_RADII * surface.perimeter_m() / TAU,
+            radius_sigma: DEFAULT_SHAPE_SIGMA_RADII,
             nominal_radius_m: surface.perimeter_m() / TAU,
             surface,
             frames,
@@ -88,6 +91,7 @@ impl<'a> From<&'a Survey> for RefineInput<'a> {
             bend: survey.bend,
             displacement: survey.displacement.as_ref(),
             shape_sigma_m: survey.shape_sigma_m,
+            radius_sigma: survey.radius_sigma,
             frames: &survey.frames,
             initial: &survey.initial,
             prior: survey.prior,

@@ -104,5 +104,6 @@ pub use uncertainty::masked_report::{MaskedPlace, MaskedReport};
 pub use uncertainty::model_error::ModelErrorReport;
 pub use uncertainty::rolling_shutter_test::ReadoutEstimate;
 pub use uncertainty::shape_report::{EstimatedShape, ScaleReport, ShapeReport, UnseenScaleReport};
+pub use verdict::length_scale::{LengthScale, RadiusSource};
 pub use verdict::prior_test::{PriorTest, ScaleTest, SigmaTest};
 pub use verdict::survey_verdict::SurveyVerdict;

@@ -9,6 +9,7 @@ use crate::uncertainty::masked_report::MaskedReport;
 use crate::uncertainty::model_error::ModelErrorReport;
 use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::uncertainty::shape_report::ShapeReport;
+use crate::verdict::length_scale::LengthScale;
 use crate::verdict::prior_test::PriorTest;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use serde::{Deserialize, Serialize};
@@ -129,6 +130,8 @@ pub struct RefineReport {
     pub prior_test: PriorTest,
     /// The verdict: whether the result may be used, and for what.
     pub verdict: SurveyVerdict,
+    /// The scale: how sure all lengths are.
+    pub scale: LengthScale,
     /// The rolling-shutter test: the readout time that fits the frames best, where they determine
     /// it.
     #[serde(skip_serializing_if = "Option::is_none")]

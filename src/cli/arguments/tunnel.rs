@@ -61,6 +61,7 @@ impl TunnelArguments {
             shape_file: None,
             points: None,
             shape_sigma_mm: None,
+            radius_sigma_percent: None,
             ignore: Vec::new(),
         }
     }

@@ -306,6 +306,7 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
             100.0 * masked.share
         ));
     }
+    terminal.say(report.scale.sentence());
     if report.calibration.is_some() {
         terminal.say(format!(
             "{out} is a survey with the refined calibration: tunnelstitch stitch {out} --poses {} \

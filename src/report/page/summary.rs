@@ -61,6 +61,9 @@ pub fn section(data: &PageData) -> Markup {
                 @if let Some(verdict) = &refinement.verdict {
                     p.note { (sentence(&verdict.sentence)) }
                 }
+                @if let Some(scale) = &refinement.scale {
+                    p.note { (sentence(&scale.sentence())) }
+                }
                 @if let Some(points) = &refinement.points {
                     p.note { (sentence(&points.sentence())) }
                 }

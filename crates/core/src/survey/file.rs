@@ -182,6 +182,7 @@ mod tests {
                 shape_file: None,
                 points: None,
                 shape_sigma_mm: None,
+                radius_sigma_percent: Some(0.5),
                 ignore: vec![IgnoreSection {
                     theta_deg: Some([150.0, 210.0]),
                     chainage_m: None,

@@ -9,6 +9,7 @@
 //! shape_file = "shape.json"   # optional: the wall as built, as `refine` writes it
 //! points = "scan.laz"         # optional: measured points of the wall (`points::read_points`)
 //! shape_sigma_mm = 10.0       # optional: deviation from the shape, 1-σ; 0 if it is exact
+//! radius_sigma_percent = 0.33 # optional: 1-σ of its size; 0 if it is exact
 //! ignore = [                  # optional: regions of the wall that refine excludes
 //!     { theta_deg = [150, 210], chainage_m = [2.0, 5.5] }, # either is optional
 //! ]

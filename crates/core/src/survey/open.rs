@@ -38,6 +38,8 @@ pub struct Survey {
     pub displacement: Option<RadialField>,
     /// 1-σ of the wall's deviation from the given shape, metres.
     pub shape_sigma_m: f64,
+    /// Relative 1-σ of the tunnel's radius; 0 if it is exact.
+    pub radius_sigma: f64,
     /// Regions of the wall that are excluded from the comparison of frames.
     pub ignored: WallRegions,
     /// The frames, sorted by name, with their common mask.
@@ -94,6 +96,7 @@ impl Survey {
         };
         let planned = file.tunnel.surface(&toml_path, &folder)?;
         let shape_sigma_m = file.tunnel.shape_sigma_m().map_err(value)?;
+        let radius_sigma = file.tunnel.radius_sigma().map_err(value)?;
         let found = file.tunnel.found_shape(planned.as_ref(), &folder)?;
         let bend = found.as_ref().and_then(|found| found.bend);
         let nominal = bent(&planned, bend);
@@ -132,6 +135,7 @@ impl Survey {
             bend,
             displacement,
             shape_sigma_m,
+            radius_sigma,
             ignored,
             frames: FrameSet::new(frames, mask),
             initial: Vec::new(),
@@ -250,6 +254,7 @@ impl Survey {
                 bend: self.bend,
                 displacement: self.displacement.clone(),
                 shape_sigma_m: self.shape_sigma_m,
+                radius_sigma: self.radius_sigma,
                 ignored: self.ignored.clone(),
                 frames: self.frames.first(most_frames),
                 initial: self.carried(stamped.take(most_frames).collect()),

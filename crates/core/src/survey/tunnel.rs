@@ -16,6 +16,8 @@ use tunnelstitch_geometry::trajectory::{PoseError, text};
 pub const DEFAULT_SHAPE_SIGMA_RADII: f64 = 1.0 / 300.0;
 /// Largest 1-σ of it, radii.
 const MAX_SHAPE_SIGMA_RADII: f64 = 0.1;
+/// Largest 1-σ of the radius, percent.
+const MAX_RADIUS_SIGMA_PERCENT: f64 = 30.0;
 
 /// The section of the tunnel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,6 +59,10 @@ pub struct TunnelSection {
     /// that of a real lining, a 300th of the radius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape_sigma_mm: Option<f64>,
+    /// 1-σ of the radius (of the size of any other section), percent; 0 if it is exact. By default
+    /// that of a real lining, a third.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius_sigma_percent: Option<f64>,
     /// A file of measured points of the wall, in the world of the poses
     /// ([`crate::points::read_points`]).
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -78,6 +84,7 @@ impl TunnelSection {
             centreline: None,
             shape_file: None,
             shape_sigma_mm: None,
+            radius_sigma_percent: None,
             points: None,
             ignore: Vec::new(),
         }
@@ -107,6 +114,23 @@ impl TunnelSection {
             Some(mm) => Err(format!(
                 "tunnel.shape_sigma_mm is {mm}; it must lie between 0 (exact) and {most_mm:.0}, a \
                  tenth of the radius"
+            )),
+        }
+    }
+
+    /// Relative 1-σ of the radius, or of the size of any other section.
+    ///
+    /// # Errors
+    /// A value that is negative or more than 30 percent, as text.
+    pub fn radius_sigma(&self) -> Result<f64, String> {
+        match self.radius_sigma_percent {
+            None => Ok(DEFAULT_SHAPE_SIGMA_RADII),
+            Some(percent) if (0.0..=MAX_RADIUS_SIGMA_PERCENT).contains(&percent) => {
+                Ok(0.01 * percent)
+            }
+            Some(percent) => Err(format!(
+                "tunnel.radius_sigma_percent is {percent}; it must lie between 0 (exact) and \
+                 {MAX_RADIUS_SIGMA_PERCENT}"
             )),
         }
     }
@@ -258,6 +282,18 @@ mod tests {
     }
 
     #[test]
+    fn the_radius_is_a_third_of_a_percent_sure_or_as_said() {
+        let mut tunnel = TunnelSection::round(3.0);
+        assert!((tunnel.radius_sigma().unwrap() - 1.0 / 300.0).abs() < 1e-12);
+        tunnel.radius_sigma_percent = Some(2.0);
+        assert_eq!(tunnel.radius_sigma(), Ok(0.02));
+        for wrong in [-1.0, 31.0, f64::NAN] {
+            tunnel.radius_sigma_percent = Some(wrong);
+            assert!(tunnel.radius_sigma().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
     fn shapes_want_their_own_sizes() {
         let tunnel = |shape, sizes: [Option<f64>; 3]| TunnelSection {
             shape,
@@ -267,6 +303,7 @@ mod tests {
             centreline: None,
             shape_file: None,
             shape_sigma_mm: None,
+            radius_sigma_percent: None,
             points: None,
             ignore: Vec::new(),
         };

@@ -15,6 +15,7 @@ use crate::uncertainty::model_error::ModelErrorReport;
 use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::uncertainty::shape_report::{EstimatedShape, ShapeReport};
 use crate::verdict::bridging::Bridging;
+use crate::verdict::length_scale::LengthScale;
 use crate::verdict::prior_test::PriorTest;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use nalgebra::{Matrix6, Vector3};
@@ -203,6 +204,9 @@ impl Placement {
             parts.model_error.as_ref(),
             contradiction.as_deref(),
         );
+        let points = setup.wall.as_ref().map(|wall| wall.report.clone());
+        let radius = (radius_m, setup.input.radius_sigma);
+        let length_scale = LengthScale::new(radius, parts.calibration.as_ref(), points.as_ref());
         let (by, scale) = self.wall_motion;
         let masked = parts.masked.filter(|_| !photometric.is_empty());
         let masked = masked.map(|masked| masked.moved(by, scale));
@@ -223,12 +227,13 @@ impl Placement {
                 model_error: parts.model_error,
                 prior_test: self.prior_test,
                 verdict,
+                scale: length_scale,
                 shape: parts.shape,
                 masked: (masked.as_ref())
                     .map(|masked| MaskedReport::new(masked, self.nominal.as_ref(), scale)),
                 bend: (self.bend.zip(parts.bend_sigma_per_m))
                     .map(|(bend, sigma_per_m)| BendReport::new(bend, sigma_per_m)),
-                points: setup.wall.as_ref().map(|wall| wall.report.clone()),
+                points,
                 calibration: parts.calibration,
                 timings: parts.timings,
             },
