@@ -38,7 +38,7 @@ pub struct Refinement {
     /// The test of the prior.
     #[serde(default)]
     pub prior_test: PriorTest,
-    /// How sure all lengths are; none in files of earlier versions.
+    /// The scale: how sure all lengths are; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<LengthScale>,
     /// The wall that was left out; none in files of earlier versions.

@@ -1,4 +1,4 @@
-//! How sure the lengths of a result are.
+//! Scale of a result: how sure its lengths are.
 //!
 //! Pictures stay the same when the tunnel and all positions grow together. So lengths follow what
 //! is known of the radius, whose relative error is that of all of them. Every other σ of the result
@@ -14,11 +14,11 @@ use serde::{Deserialize, Serialize};
 pub struct LengthScale {
     /// 1-σ of the radius, and with it of all lengths, percent; 0 if the radius is exact.
     pub sigma_percent: f64,
-    /// What the radius is known from.
+    /// Source of the radius.
     pub radius: RadiusSource,
 }
 
-/// What the radius is known from.
+/// Source of the radius.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]

@@ -8,8 +8,8 @@
 //! [`frame_verdict`] turns the evidence about a frame into one decision with its reason, and
 //! [`prior_test`] compares the refined steps with the initial ones. Frames that are not photometric
 //! get their poses by the prior ([`bridging`]); a survey without any keeps its initial poses.
-//! [`survey_verdict`] says in one sentence what may be done with the result, [`length_scale`] how sure
-//! its lengths are.
+//! [`survey_verdict`] says in one sentence what may be done with the result, [`length_scale`] how
+//! sure its lengths are.
 
 pub mod bridging;
 pub mod frame_verdict;
