@@ -3,8 +3,8 @@
 use super::error::ReportError;
 use crate::evaluate::deformation::{SectionDeformation, read_sections};
 use crate::refine::{
-    FrameReport, LengthScale, LevelReport, MaskedReport, PointsReport, PriorTest, StageTime,
-    SurveyVerdict, read_covariances,
+    FrameReport, LengthScale, LevelReport, MaskedReport, PointsReport, PriorTest, ShapeReport,
+    StageTime, SurveyVerdict, read_covariances,
 };
 use crate::survey::{MASKED_FILE, MaskedWall, Survey};
 use crate::trajectory::{Pose, poses_of};
@@ -41,6 +41,9 @@ pub struct Refinement {
     /// The scale: how sure all lengths are; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scale: Option<LengthScale>,
+    /// The wall's shape; none if it was taken as given, and in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<ShapeReport>,
     /// The wall that was left out; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked: Option<MaskedReport>,

@@ -4,6 +4,7 @@ use super::map_strip::{MapStrip, scale_legend};
 use super::page_data::PageData;
 use super::section_plot::{Exaggeration, section_plot};
 use crate::evaluate::deformation::{DeviationGrid, SectionDeformation, clock_position};
+use crate::refine::ShapeReport;
 use crate::report::chart::{Axis, Chart, ChartElement, CurveStyle, Series, Vertical, legend};
 use crate::report::deformation::Deformation;
 use crate::report::error::ReportError;
@@ -20,11 +21,23 @@ pub fn section(data: &PageData) -> Result<Option<Markup>, ReportError> {
     let report = data.report;
     match &report.deformation {
         Some(deformation) => Ok(Some(draw(deformation, report.survey.perimeter_m)?)),
-        None => Ok(report.refinement.is_some().then(|| {
-            html! {
-                p { "No deformation was found: as far as the frames show, the wall is as given." }
-            }
+        None => Ok(report.refinement.as_ref().map(|refinement| {
+            html! { p { (without_deformation(refinement.shape.as_ref())) } }
         })),
+    }
+}
+
+/// Words about a wall without a deformation; `shape`: that was estimated, if one was looked for.
+fn without_deformation(shape: Option<&ShapeReport>) -> String {
+    let Some(shape) = shape else {
+        return "No deformation was looked for: the wall is taken as given.".to_owned();
+    };
+    let none = "No deformation was found: as far as the frames show, the wall is as given.";
+    match shape.none_above_mm() {
+        Some(mm) => {
+            format!("{none} One of {mm:.2} mm (root mean square) would have been seen.")
+        }
+        None => none.to_owned(),
     }
 }
 
