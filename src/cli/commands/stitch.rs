@@ -14,7 +14,7 @@ use crate::render::{
     Stitch, StitchOptions, WallProperties,
 };
 use crate::surface::WallPoint;
-use crate::survey::{MASKED_FILE, MaskedWall, Survey};
+use crate::survey::{MaskedWall, Survey};
 use crate::trajectory::poses_of;
 use nalgebra::Matrix6;
 use serde::Serialize;
@@ -306,12 +306,14 @@ fn read_masked_wall(
     arguments: &StitchArguments,
     survey: &Survey,
 ) -> Result<Option<MaskedWall>, Failure> {
-    let beside = (arguments.poses.file()).map(|file| file.with_file_name(MASKED_FILE));
-    let path = beside.filter(|path| arguments.output.has_maps() && path.is_file());
-    let perimeter_m = survey.nominal.perimeter_m();
-    Ok(path
-        .map(|path| MaskedWall::read(&path, perimeter_m))
-        .transpose()?)
+    let poses = arguments.poses.file();
+    match poses.filter(|_| arguments.output.has_maps()) {
+        Some(poses) => Ok(MaskedWall::read_beside(
+            poses,
+            survey.nominal.perimeter_m(),
+        )?),
+        None => Ok(None),
+    }
 }
 
 /// Reads the covariances of the poses for the map of uncertainty: those of --covariance, else those

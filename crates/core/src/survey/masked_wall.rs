@@ -17,6 +17,7 @@
 //! see it, and how many of them were left out.
 
 use super::error::SurveyError;
+use super::wall_file::{check_format, check_origin, check_perimeter, read_wall_file};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use tunnelstitch_geometry::surface::WallPoint;
@@ -25,8 +26,6 @@ use tunnelstitch_geometry::surface::WallPoint;
 pub const MASKED_FILE: &str = "masked.json";
 /// Name and version of the format.
 const FORMAT: &str = "wall-masked-1";
-/// Largest difference between the perimeter of the file and that of the tunnel, relative.
-const MAX_PERIMETER_ERROR: f64 = 1e-6;
 
 /// The content of `masked.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -112,25 +111,25 @@ impl MaskedWall {
     /// # Errors
     /// [`SurveyError::Value`] that names the file and what is wrong.
     pub fn read(path: &Path, perimeter_m: f64) -> Result<Self, SurveyError> {
-        let value = |what: String| SurveyError::Value {
-            path: path.to_owned(),
-            what,
-        };
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| value(format!("cannot read the masked wall: {error}")))?;
-        let file: Self = serde_json::from_str(&text).map_err(|error| value(error.to_string()))?;
-        file.check(perimeter_m).map_err(value)?;
-        Ok(file)
+        read_wall_file(path, "the masked wall", |file: &Self| {
+            file.check(perimeter_m)
+        })
+    }
+
+    /// Reads the file beside another one, such as that of the poses; None if there is none.
+    ///
+    /// # Errors
+    /// As [`MaskedWall::read`].
+    pub fn read_beside(file: &Path, perimeter_m: f64) -> Result<Option<Self>, SurveyError> {
+        let path = file.with_file_name(MASKED_FILE);
+        path.is_file()
+            .then(|| Self::read(&path, perimeter_m))
+            .transpose()
     }
 
     /// Checks all values; returns what is wrong.
     fn check(&self, perimeter_m: f64) -> Result<(), String> {
-        if self.format != FORMAT {
-            return Err(format!(
-                "format is {:?}; it must be {FORMAT:?}",
-                self.format
-            ));
-        }
+        check_format(&self.format, FORMAT)?;
         let sizes = [
             ("perimeter_m", self.perimeter_m),
             ("columns", self.columns as f64),
@@ -139,17 +138,8 @@ impl MaskedWall {
         if let Some((name, size)) = (sizes.iter()).find(|(_, s)| !(s.is_finite() && *s > 0.0)) {
             return Err(format!("{name} is {size}; it must be positive"));
         }
-        let ratios = 1.0 - MAX_PERIMETER_ERROR..1.0 + MAX_PERIMETER_ERROR;
-        if !ratios.contains(&(self.perimeter_m / perimeter_m)) {
-            return Err(format!(
-                "perimeter_m is {}, that of the tunnel {perimeter_m}; the masked wall is of \
-                 another tunnel",
-                self.perimeter_m
-            ));
-        }
-        if !(self.origin.s_m.is_finite() && self.origin.h_m.is_finite()) {
-            return Err("origin is not finite".to_owned());
-        }
+        check_perimeter(self.perimeter_m, perimeter_m, "the masked wall")?;
+        check_origin(self.origin)?;
         if let Some((row, from, to)) = (self.seen.iter())
             .find(|(_, from, to)| !(0 <= *from && from < to && *to <= self.columns))
         {

@@ -90,6 +90,7 @@ mod shape_file;
 mod template;
 mod tunnel;
 mod unposed_frames;
+mod wall_file;
 
 pub use associate::{Associate, TIME_TOLERANCE_S};
 pub use calibrate::{CalibrateSection, CalibrationGroup};

@@ -5,7 +5,7 @@ use super::error::SurveyError;
 use super::file::read_survey_file;
 use super::file::{SURVEY_FILE, SurveyFile};
 use super::frame_list::FrameList;
-use super::masked_wall::{MASKED_FILE, MaskedWall};
+use super::masked_wall::MaskedWall;
 use super::pose_reader::{InterpretedPoses, PoseReader};
 use super::poses_section::PosesSection;
 use super::shape_file::ShapeFile;
@@ -321,10 +321,9 @@ impl Survey {
     /// A malformed file, or one of another tunnel.
     pub fn masked_wall(&self) -> Result<Option<MaskedWall>, SurveyError> {
         let shape_file = self.file.tunnel.shape_file.as_ref();
-        let path = shape_file.map(|file| self.folder.join(file).with_file_name(MASKED_FILE));
-        let path = path.filter(|path| path.is_file());
-        path.map(|path| MaskedWall::read(&path, self.nominal.perimeter_m()))
-            .transpose()
+        shape_file.map_or(Ok(None), |file| {
+            MaskedWall::read_beside(&self.folder.join(file), self.nominal.perimeter_m())
+        })
     }
 
     /// Reads the tunnel's frame in the world of the initial poses; None if they are the same.

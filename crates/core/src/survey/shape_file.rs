@@ -23,6 +23,7 @@
 //! ([`tunnelstitch_geometry::surface::Bend`]); its wall is displaced from there.
 
 use super::error::SurveyError;
+use super::wall_file::{check_format, check_origin, check_perimeter, read_wall_file};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use tunnelstitch_geometry::surface::{Bend, RadialField, SplineLattice, WallPoint};
@@ -37,8 +38,6 @@ const MAX_COLUMNS: usize = 1024;
 const MAX_DISPLACEMENT_SHARE: f64 = 0.05;
 /// Smallest radius of a bend, perimeters; a tighter one is no deviation from a plan.
 const MIN_BEND_RADIUS_PERIMETERS: f64 = 1.0;
-/// Largest difference between the perimeter of the file and that of the tunnel, relative.
-const MAX_PERIMETER_ERROR: f64 = 1e-6;
 
 /// The content of `shape.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -115,15 +114,9 @@ impl ShapeFile {
     /// # Errors
     /// [`SurveyError::Value`] that names the file and what is wrong.
     pub fn read(path: &Path, perimeter_m: f64) -> Result<Self, SurveyError> {
-        let value = |what: String| SurveyError::Value {
-            path: path.to_owned(),
-            what,
-        };
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| value(format!("cannot read the wall's shape: {error}")))?;
-        let file: Self = serde_json::from_str(&text).map_err(|error| value(error.to_string()))?;
-        file.check(perimeter_m).map_err(value)?;
-        Ok(file)
+        read_wall_file(path, "the wall's shape", |file: &Self| {
+            file.check(perimeter_m)
+        })
     }
 
     /// The field.
@@ -143,20 +136,8 @@ impl ShapeFile {
 
     /// Checks all values; returns what is wrong.
     fn check(&self, perimeter_m: f64) -> Result<(), String> {
-        if self.format != FORMAT {
-            return Err(format!(
-                "format is {:?}; it must be {FORMAT:?}",
-                self.format
-            ));
-        }
-        let ratios = 1.0 - MAX_PERIMETER_ERROR..1.0 + MAX_PERIMETER_ERROR;
-        if !ratios.contains(&(self.perimeter_m / perimeter_m)) {
-            return Err(format!(
-                "perimeter_m is {}, that of the tunnel {perimeter_m}; the shape is of another \
-                 tunnel",
-                self.perimeter_m
-            ));
-        }
+        check_format(&self.format, FORMAT)?;
+        check_perimeter(self.perimeter_m, perimeter_m, "the shape")?;
         if !(MIN_COLUMNS..=MAX_COLUMNS).contains(&self.columns) || !self.columns.is_power_of_two() {
             return Err(format!(
                 "columns is {}; it must be a power of two from {MIN_COLUMNS} to \
@@ -164,9 +145,7 @@ impl ShapeFile {
                 self.columns
             ));
         }
-        if !(self.origin.s_m.is_finite() && self.origin.h_m.is_finite()) {
-            return Err("origin is not finite".to_owned());
-        }
+        check_origin(self.origin)?;
         if let Some(bend) = &self.bend {
             let least_m = MIN_BEND_RADIUS_PERIMETERS * perimeter_m;
             let is_possible = bend.at_h_m.is_finite() && bend.radius_m() > least_m;

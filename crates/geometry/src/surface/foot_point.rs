@@ -19,6 +19,13 @@ pub struct FootPoint {
     pub distance_m: f64,
 }
 
+/// Chainage of a point (world, metres), and its vector from the tunnel's axis in its section.
+pub fn from_axis(surface: &dyn Surface, point: &Vector3<f64>) -> (f64, Vector3<f64>) {
+    let straight = surface.straightened(&Pose::new(Default::default(), *point));
+    let across = Vector3::new(straight.t_wc.x, 0.0, straight.t_wc.z);
+    (straight.t_wc.y, straight.r_wc.inverse() * across)
+}
+
 /// Finds the foot point of `point` (world, metres): `X(s, h) + d n(s, h) = point`.
 ///
 /// Starts where the ray from the tunnel's axis through the point meets the wall, in the section of
@@ -26,9 +33,7 @@ pub struct FootPoint {
 /// is not finite, and one for which that does not converge: near an edge of the wall it has no foot
 /// point, or several.
 pub fn foot_point(surface: &dyn Surface, point: &Vector3<f64>) -> Option<FootPoint> {
-    let straight = surface.straightened(&Pose::new(Default::default(), *point));
-    let across = Vector3::new(straight.t_wc.x, 0.0, straight.t_wc.z);
-    let outwards = straight.r_wc.inverse() * across;
+    let (_, outwards) = from_axis(surface, point);
     let hit = surface.hit(&(point - outwards), &outwards).ok()?;
     let mut wall = hit.wall;
     let converged_m = CONVERGED * surface.perimeter_m();

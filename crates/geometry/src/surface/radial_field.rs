@@ -137,8 +137,15 @@ impl RadialField {
         Self::new(lattice, first, coefficients_m)
     }
 
-    /// The sum of this field and another on the same lattice, over the rows of both.
+    /// The sum of this field and another on a lattice of the same origin, on the finer of the two
+    /// and over the rows of both.
     pub fn plus(&self, other: &Self) -> Self {
+        if self.lattice.columns < other.lattice.columns {
+            return self.halved().plus(other);
+        }
+        if other.lattice.columns < self.lattice.columns {
+            return self.plus(&other.halved());
+        }
         let (a, b) = (self.rows(), other.rows());
         let rows = a.start.min(b.start)..a.end.max(b.end);
         let first_row = rows.start;
@@ -218,6 +225,9 @@ pub(super) mod tests {
         let field = irregular(0.01);
         let (halved, by) = (field.halved(), WallPoint { s_m: 2.0, h_m: 5.0 });
         let (moved, twice) = (field.clone().moved(by), halved.plus(&halved));
+        // A sum is on the finer lattice.
+        assert_eq!(field.plus(&halved), twice);
+        assert_eq!(halved.plus(&field), twice);
         for (s_m, h_m) in [(0.1, 0.2), (18.8, 3.3), (7.0, -2.9), (1.0, -50.0)] {
             let delta_m = field.at(WallPoint { s_m, h_m }).delta_m;
             assert!((halved.at(WallPoint { s_m, h_m }).delta_m - delta_m).abs() < 1e-15);

@@ -130,18 +130,10 @@ pub fn total_displacement(
     known: Option<&RadialField>,
     further: Option<RadialField>,
 ) -> Option<RadialField> {
-    let (known, further) = match (known, further) {
-        (Some(known), Some(further)) => (known.clone(), further),
-        (known, further) => return further.or(known.cloned()),
-    };
-    let columns = known.lattice().columns.max(further.lattice().columns);
-    let refined = |mut field: RadialField| {
-        while field.lattice().columns < columns {
-            field = field.halved();
-        }
-        field
-    };
-    Some(refined(known).plus(&refined(further)))
+    match (known, further) {
+        (Some(known), Some(further)) => Some(known.plus(&further)),
+        (known, further) => further.or(known.cloned()),
+    }
 }
 
 /// The frames of a problem.

@@ -293,6 +293,15 @@ impl ShapeModel {
         values
     }
 
+    /// The displacement with the given coefficients, metres; None if there are no functions.
+    pub fn field_of(&self, coefficients: Vec<ShapeStep>) -> Option<RadialField> {
+        let shape = Shape {
+            model: self.clone(),
+            coefficients,
+        };
+        shape.field()
+    }
+
     /// The finest lattice of the model, or one that is fine enough for the harmonics.
     fn finest_columns(&self) -> usize {
         let finest = self.finest_lattice().map_or(0, |(columns, _)| columns);

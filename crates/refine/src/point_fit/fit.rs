@@ -124,7 +124,7 @@ impl PointFit<'_> {
         Ok(FittedWall {
             report: PointsReport::new(self.points, &axis, sections, &lattices),
             displacement: match self.known {
-                Some(known) => sum_of(known, field),
+                Some(known) => known.plus(&field),
                 None => field,
             },
             bend,
@@ -149,7 +149,8 @@ impl PointFit<'_> {
         let radius_m = self.radius_m;
         let bend_sigma = 1.0 / (BEND_RADIUS_RADII * radius_m);
         let mut bend: Option<(Bend, [f64; 2])> = None;
-        for round in 0.. {
+        let mut bends = 0;
+        loop {
             let nominal = bent(self.planned, bend.map(|(bend, _)| bend));
             let extent = self.extent_h_m;
             let cells = locate_points(self.points, nominal.as_ref(), self.known, radius_m, extent);
@@ -163,7 +164,8 @@ impl PointFit<'_> {
             let Some(axis) = fit_axis(&fits.sections, &prior) else {
                 return Err(self.too_few(&cells));
             };
-            if axis.is_bent && round < MAX_BENDS {
+            if axis.is_bent && bends < MAX_BENDS {
+                bends += 1;
                 let [x, z] = bend.map_or([0.0; 2], |(bend, _)| bend.curvature_per_m);
                 let [_, by_x, by_z] = &axis.modes;
                 let curvature_per_m = [x + by_x.beta[2], z + by_z.beta[2]];
@@ -184,7 +186,6 @@ impl PointFit<'_> {
                 axis,
             });
         }
-        Err(self.too_few(&[]))
     }
 
     /// The error of a file with too few points.
@@ -226,18 +227,6 @@ impl PointFit<'_> {
             z_tilt: 1e3 * z.beta[1],
         })
     }
-}
-
-/// The sum of two fields on lattices of the same origin.
-fn sum_of(known: &RadialField, mut further: RadialField) -> RadialField {
-    let mut known = known.clone();
-    while known.lattice().columns < further.lattice().columns {
-        known = known.halved();
-    }
-    while further.lattice().columns < known.lattice().columns {
-        further = further.halved();
-    }
-    known.plus(&further)
 }
 
 impl FittedWall {

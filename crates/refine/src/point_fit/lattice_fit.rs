@@ -275,11 +275,7 @@ impl<'e> System<'e> {
                 let column = |block: &SMatrix<f64, FRAME_PARAMETERS, BATCH>| -> ShapeStep {
                     block.column(draw).into_owned()
                 };
-                let drawn = Shape {
-                    model: shape.model.clone(),
-                    coefficients: errors.iter().map(column).collect(),
-                };
-                drawn.field()
+                shape.model.field_of(errors.iter().map(column).collect())
             };
             draws.extend((0..BATCH).par_map(field).into_iter().flatten());
         }

@@ -1,9 +1,8 @@
 //! Robust weights and the scale of residuals.
 
+use tunnelstitch_core::frames::MAD_TO_SIGMA;
 use tunnelstitch_geometry::numerics::median::upper_median;
 
-/// 1-σ of a normal distribution over the median of absolute values.
-const SIGMA_OVER_MEDIAN: f64 = 1.4826;
 /// Residual from which Huber's weight falls, σ: 95 % of the efficiency of least squares if errors
 /// are normal.
 const HUBER_SIGMAS: f64 = 1.345;
@@ -23,7 +22,7 @@ pub fn robust_sigma_m(residuals_m: impl Iterator<Item = f64>) -> f64 {
     let median = |sizes_m: &[f64]| {
         let median = upper_median(sizes_m.to_vec());
         median.map_or(MIN_SIGMA_M, |median| {
-            (SIGMA_OVER_MEDIAN * median).max(MIN_SIGMA_M)
+            (MAD_TO_SIGMA * median).max(MIN_SIGMA_M)
         })
     };
     let of_all_m = median(&sizes_m);

@@ -15,6 +15,7 @@ use crate::point_fit::robust::{Weighting, huber_weight, robust_sigma_m, tukey_we
 use nalgebra::{SMatrix, SVector};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use tunnelstitch_geometry::numerics::median::upper_median;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::SplineLattice;
 
@@ -137,9 +138,7 @@ fn fit_section(row: i64, rows: &[Row], shape_sigma_m: f64) -> Option<(SectionFit
     });
     let mut unknowns = Unknowns::zeros();
     // The median distance, so that the first weights are those about the wall.
-    let mut distances: Vec<f64> = rows.iter().map(|row| row.distance_m).collect();
-    distances.sort_unstable_by(f64::total_cmp);
-    unknowns[0] = distances[distances.len() / 2];
+    unknowns[0] = upper_median(rows.iter().map(|row| row.distance_m).collect())?;
     let residual = |unknowns: &Unknowns, row: &Row| row.distance_m - row.design.dot(unknowns);
     let mut covariance = SMatrix::zeros();
     let mut sigma_m = 0.0;

@@ -9,7 +9,7 @@ use std::path::Path;
 use tunnelstitch_core::points::{PointsError, read_points};
 use tunnelstitch_core::survey::{Survey, SurveyError};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-use tunnelstitch_geometry::surface::Surface;
+use tunnelstitch_geometry::surface::{Surface, from_axis};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// Cells around the section: those of the finest lattice of the wall's shape.
@@ -159,15 +159,11 @@ impl<'s> Thinning<'s> {
 
     /// The cell of a point.
     fn cell_of(&self, point: &Vector3<f64>) -> CellOf {
-        let pose = Pose::new(Default::default(), *point);
-        let straight = self.surface.straightened(&pose);
         let [from, to] = self.range_h_m;
-        let (t, h_m) = (straight.t_wc, straight.t_wc.y);
+        let (h_m, outwards) = from_axis(self.surface, point);
         if !(from..=to).contains(&h_m) {
             return CellOf::Beyond;
         }
-        let across = Vector3::new(t.x, 0.0, t.z);
-        let outwards = straight.r_wc.inverse() * across;
         let Ok(hit) = self.surface.hit(&(point - outwards), &outwards) else {
             return CellOf::OffWall;
         };

@@ -22,7 +22,7 @@
 //! dropped, the least useful first: a wall as planned ends without a shape, and its poses as if
 //! none had been looked for.
 //!
-//! What may hide below that is told by the same L: the strength of a dropped scale at which L has
+//! The same L bounds what may hide below that: the strength of a dropped scale at which L has
 //! fallen by `½ z²` ([`LearnedShape::dropped_scales`]), z the quantile of the false-alarm rate.
 //!
 //! A solve that ends for want of descent, as where the wall is not smooth, leaves a gradient that

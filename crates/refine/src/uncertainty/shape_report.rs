@@ -146,13 +146,7 @@ impl EstimatedShape {
 /// Draws of the errors of a shape, as fields.
 fn error_draws(shape: &Shape, covariance: &TotalCovariance, first_slot: usize) -> Vec<RadialField> {
     let draws = covariance.error_draws(first_slot);
-    let fields = draws.par_map(|coefficients| {
-        let drawn = Shape {
-            model: shape.model.clone(),
-            coefficients: coefficients.clone(),
-        };
-        drawn.field()
-    });
+    let fields = draws.par_map(|coefficients| shape.model.field_of(coefficients.clone()));
     fields.into_iter().flatten().collect()
 }
 
