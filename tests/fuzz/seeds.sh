@@ -161,5 +161,5 @@ seed video probed <<'END'
 END
 printf '5:black,18-20:missing,2:repeated' | seed words bad-frames
 printf 'YxZ' | seed words orientation
-printf '\202\200\201\200\377' | seed checkpoint cbor 0
+printf '\000\000\000' | seed checkpoint empty 0
 echo "seeds for: $(ls "$corpus" | tr '\n' ' ')"

@@ -5,15 +5,10 @@
 use libfuzzer_sys::fuzz_target;
 use tunnelstitch::frames::Shading;
 use tunnelstitch::persist::checkpoint::{Checkpoint, Origin};
-use tunnelstitch::refine::{FrameReport, LevelReport};
+use tunnelstitch::refine::SolveRecord;
 
 /// The types that states consist of.
-type State = (
-    Option<Shading>,
-    Vec<LevelReport>,
-    Vec<FrameReport>,
-    Vec<f64>,
-);
+type State = (Option<Shading>, Vec<SolveRecord>, Vec<f64>);
 
 fuzz_target!(|data: &[u8]| {
     let Some((first, content)) = data.split_first() else {

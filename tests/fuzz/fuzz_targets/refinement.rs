@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::sync::OnceLock;
-use tunnelstitch::evaluate::{CompareInput, Comparison, ComparedPanoramas, compare};
+use tunnelstitch::evaluate::{CompareInput, ComparedPanoramas, Comparison, compare};
 use tunnelstitch::progress::Silent;
 use tunnelstitch::render::RenderOptions;
 use tunnelstitch::report::{RefinedFiles, Sources, gather, page};

@@ -5,7 +5,7 @@ use libfuzzer_sys::fuzz_target;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::sync::OnceLock;
-use tunnelstitch::inspect::{Marks, SourceFrames, ServerContent, Server, Viewer};
+use tunnelstitch::inspect::{Marks, Server, ServerContent, SourceFrames, Viewer};
 use tunnelstitch::render::place;
 use tunnelstitch::survey::Survey;
 use tunnelstitch_fuzz::small_survey;

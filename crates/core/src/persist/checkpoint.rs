@@ -6,8 +6,9 @@
 //! of the program with the same options and inputs ([`Origin`]); any other run is refused. It is
 //! removed when the run ends.
 //!
-//! A state is stored as CBOR (RFC 8949), which restores every number bit for bit, followed by its
-//! BLAKE3 hash.
+//! A state is stored in the format of `postcard`, which restores every number bit for bit, followed
+//! by its BLAKE3 hash. The format names neither fields nor types: only the version of the program
+//! that wrote a state reads it.
 //!
 //! # Example
 //!
@@ -35,8 +36,9 @@
 
 use super::atomic::{self, WriteError};
 use super::provenance::Input;
-use serde::de::{DeserializeOwned, Error};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::fmt::Display;
 use std::fs::{File, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
@@ -134,19 +136,6 @@ impl Origin {
     }
 }
 
-/// A state that is read through `dyn Deserializer`, so that the reader of CBOR is compiled once and
-/// not for every type.
-struct Erased<S>(S);
-
-impl<'de, S: Deserialize<'de>> Deserialize<'de> for Erased<S> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let mut erased = <dyn erased_serde::Deserializer>::erase(deserializer);
-        erased_serde::deserialize(&mut erased)
-            .map(Self)
-            .map_err(Error::custom)
-    }
-}
-
 /// The checkpoint of one run, locked during its lifetime.
 #[derive(Debug)]
 pub struct Checkpoint {
@@ -182,7 +171,7 @@ impl Checkpoint {
         };
         checkpoint.begun = !fresh && checkpoint.kept_files()?.iter().any(|path| is_state(path));
         if checkpoint.begun {
-            let what = match checkpoint.read::<Origin>(ORIGIN_FILE)? {
+            let what = match checkpoint.read_origin()? {
                 Some(kept) => kept.difference(origin),
                 None => Some("its origin is missing".to_owned()),
             };
@@ -192,7 +181,7 @@ impl Checkpoint {
             }
         } else {
             checkpoint.clear()?;
-            checkpoint.write(ORIGIN_FILE, origin)?;
+            checkpoint.write_origin(origin)?;
         }
         Ok(checkpoint)
     }
@@ -251,7 +240,15 @@ impl Checkpoint {
     /// # Errors
     /// [`CheckpointError::Damaged`] if it is corrupt or not an `S`.
     pub fn state<S: DeserializeOwned>(&self, name: &str) -> Result<Option<S>, CheckpointError> {
-        self.read(&format!("{name}.{STATE_EXTENSION}"))
+        let file = state_file(name);
+        let Some(content) = self.read(&file)? else {
+            return Ok(None);
+        };
+        match postcard::take_from_bytes(&content) {
+            Ok((state, [])) => Ok(Some(state)),
+            Ok(_) => Err(self.damaged(&file, "it is too long")),
+            Err(error) => Err(self.damaged(&file, error)),
+        }
     }
 
     /// Saves the state `name`, replacing the previous one. The duration, from when it became due,
@@ -261,7 +258,10 @@ impl Checkpoint {
     /// An error of the operating system.
     pub fn keep<S: Serialize>(&mut self, name: &str, state: &S) -> Result<(), WriteError> {
         let since = self.due.take().unwrap_or_else(Instant::now);
-        self.write(&format!("{name}.{STATE_EXTENSION}"), state)?;
+        self.write(&state_file(name), |writer| {
+            postcard::to_io(state, writer).map_err(io::Error::other)?;
+            Ok(())
+        })?;
         self.kept = Instant::now();
         self.wait = MIN_SAVE_INTERVAL.max(MIN_SAVE_INTERVAL_RATIO * since.elapsed());
         Ok(())
@@ -274,27 +274,50 @@ impl Checkpoint {
         due
     }
 
-    fn read<S: DeserializeOwned>(&self, file: &str) -> Result<Option<S>, CheckpointError> {
-        let damaged = |what: String| CheckpointError::Damaged {
+    fn read_origin(&self) -> Result<Option<Origin>, CheckpointError> {
+        let Some(content) = self.read(ORIGIN_FILE)? else {
+            return Ok(None);
+        };
+        let origin = serde_json::from_slice(&content);
+        origin.map_err(|error| self.damaged(ORIGIN_FILE, error))
+    }
+
+    fn write_origin(&self, origin: &Origin) -> Result<(), WriteError> {
+        self.write(ORIGIN_FILE, |writer| {
+            serde_json::to_writer(writer, origin).map_err(io::Error::from)
+        })
+    }
+
+    fn damaged(&self, file: &str, what: impl Display) -> CheckpointError {
+        CheckpointError::Damaged {
             folder: self.folder.clone(),
             what: format!("{file}: {what}"),
-        };
+        }
+    }
+
+    /// The content of a file, if it is there, without the hash that ends it.
+    fn read(&self, file: &str) -> Result<Option<Vec<u8>>, CheckpointError> {
         let path = self.folder.join(file);
-        let bytes = match std::fs::read(&path) {
+        let mut bytes = match std::fs::read(&path) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(WriteError::new(&path, error).into()),
         };
-        let content = match bytes.split_last_chunk() {
-            Some((content, hash)) if blake3::hash(content) == blake3::Hash::from(*hash) => content,
-            _ => return Err(damaged("its hash does not match".to_owned())),
-        };
-        let state = ciborium::from_reader::<Erased<S>, _>(content);
-        let state = state.map_err(|error| damaged(error.to_string()))?;
-        Ok(Some(state.0))
+        match bytes.split_last_chunk() {
+            Some((content, hash)) if blake3::hash(content) == blake3::Hash::from(*hash) => {
+                bytes.truncate(content.len());
+                Ok(Some(bytes))
+            }
+            _ => Err(self.damaged(file, "its hash does not match")),
+        }
     }
 
-    fn write(&self, file: &str, state: &dyn erased_serde::Serialize) -> Result<(), WriteError> {
+    /// Writes a file, ended by the hash of its content.
+    fn write(
+        &self,
+        file: &str,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), WriteError> {
         atomic::write(&self.folder.join(file), |writer| {
             let hashing = Hashing {
                 writer,
@@ -302,7 +325,7 @@ impl Checkpoint {
             };
             // Buffered, because hashing number by number is slow.
             let mut hashing = BufWriter::with_capacity(HASH_BUFFER_BYTES, hashing);
-            ciborium::into_writer(&state, &mut hashing).map_err(io::Error::other)?;
+            content(&mut hashing)?;
             let Hashing { writer, hasher } =
                 hashing.into_inner().map_err(IntoInnerError::into_error)?;
             writer.write_all(hasher.finalize().as_bytes())
@@ -321,6 +344,10 @@ impl Checkpoint {
         }
         Ok(())
     }
+}
+
+fn state_file(name: &str) -> String {
+    format!("{name}.{STATE_EXTENSION}")
 }
 
 fn is_state(path: &Path) -> bool {
@@ -396,7 +423,7 @@ mod tests {
         assert!(!checkpoint.is_begun());
         checkpoint.keep("a", &"an earlier one").unwrap();
         checkpoint.keep("a", &state).unwrap();
-        checkpoint.keep("b", &1).unwrap();
+        checkpoint.keep("b", &1u8).unwrap();
         assert!(!checkpoint.is_due());
         drop(checkpoint);
         let mut checkpoint = Checkpoint::open(&folder, &origin(), false).unwrap();
@@ -480,7 +507,7 @@ mod tests {
         std::fs::write(&path, &sound).unwrap();
         assert_eq!(checkpoint.state("a").unwrap(), Some(vec![1, 2, 3]));
         // An intact state may still be of another type.
-        checkpoint.keep("a", &"text").unwrap();
+        checkpoint.keep("a", &("text", 1)).unwrap();
         assert!(damaged(checkpoint.state("a")));
     }
 }

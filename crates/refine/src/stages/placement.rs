@@ -6,6 +6,7 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use crate::refined::Refined;
 use crate::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 use crate::stages::setup::Setup;
+use crate::stages::state::GlobalSolve;
 use crate::uncertainty::bend_report::BendReport;
 use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::covariance::Covariances;
@@ -50,7 +51,7 @@ pub struct ReportParts {
     /// The reason for which the last solve stopped, in words.
     pub stopped_because: String,
     /// Global solves.
-    pub levels: Vec<LevelReport>,
+    pub levels: Vec<GlobalSolve>,
     /// The rolling-shutter test.
     pub rolling_shutter: Option<ReadoutEstimate>,
     /// Errors beyond noise that the residuals show.
@@ -221,7 +222,7 @@ impl Placement {
                 frames_on_prior: parts.frames.len() - photometric.len(),
                 frames: parts.frames,
                 stopped_because: parts.stopped_because,
-                levels: parts.levels,
+                levels: parts.levels.into_iter().map(LevelReport::from).collect(),
                 rolling_shutter: parts.rolling_shutter,
                 variance_factor: self.covariances.variance_factor,
                 model_error: parts.model_error,

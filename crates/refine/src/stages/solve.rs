@@ -5,14 +5,13 @@ use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::problem::photometric_problem::PhotometricProblem;
-use crate::report::LevelReport;
 use crate::solver::argmin_glue::{self, Observation};
 use crate::solver::gauss_newton::{Solution, SolveState};
 use crate::stages::plan::{SolvePlan, Stage};
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::shape;
-use crate::stages::state::{Estimation, LastSolve, PipelineState};
+use crate::stages::state::{Estimation, GlobalSolve, LastSolve, PipelineState};
 use crate::tracking::shading_correction::correct;
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
@@ -76,12 +75,12 @@ pub fn run<'a>(
     if plan.sampling.level == 0 {
         reject_disagreeing_frames(&solution.linearisation.frames, &mut state.frames.rejections);
     }
-    state.levels.push(LevelReport {
+    state.levels.push(GlobalSolve {
         level: plan.sampling.level,
         samples_per_pixel: plan.sampling.density,
         share_of_wall: solution.problem.compared_share(),
         joint: solution.problem.is_joint(),
-        solve: solution.record.clone(),
+        record: solution.record.clone(),
     });
     if has_solve_ahead(state) && setup.frames.shading().is_some() {
         correct(&context, setup.options, &state.frames)?;

@@ -6,6 +6,7 @@ use crate::parameters::shape::Shape;
 use crate::refined::Refined;
 use crate::report::{LevelReport, StageTime};
 use crate::solver::gauss_newton::{Solution, SolveState};
+use crate::solver::solve_record::SolveRecord;
 use crate::solver::stopping::Stopping;
 use crate::stages::plan::Stage;
 use crate::tracking::alternating_calibration::AlternatingCalibration;
@@ -41,9 +42,36 @@ pub struct PipelineState {
     /// The global solve that is under way.
     pub solve: Option<SolveState>,
     /// Global solves that are over.
-    pub levels: Vec<LevelReport>,
+    pub levels: Vec<GlobalSolve>,
     /// Shared parameters that the data do not observe.
     pub unobservable: Vec<UnobservableParameter>,
+}
+
+/// One global solve that is over.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct GlobalSolve {
+    /// Pyramid level; 0 is full size.
+    pub level: usize,
+    /// Wall samples per pixel along each axis.
+    pub samples_per_pixel: f64,
+    /// Share of the wall that was compared.
+    pub share_of_wall: f64,
+    /// True if the wall was solved for jointly with the poses.
+    pub joint: bool,
+    /// Its course.
+    pub record: SolveRecord,
+}
+
+impl From<GlobalSolve> for LevelReport {
+    fn from(solve: GlobalSolve) -> Self {
+        Self {
+            level: solve.level,
+            samples_per_pixel: solve.samples_per_pixel,
+            share_of_wall: solve.share_of_wall,
+            joint: solve.joint,
+            solve: solve.record,
+        }
+    }
 }
 
 /// A checkpoint of a refinement: its state, and what lies beside it.
