@@ -6,6 +6,7 @@ use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::parameters::calibration::Kappa;
+use crate::parameters::unseen_errors::UnseenErrors;
 use crate::refined::Refined;
 use crate::stages::assess::without_solution;
 use crate::stages::plan::plan_stages;
@@ -89,6 +90,7 @@ fn begin(setup: &Setup) -> PipelineState {
         free: setup.calibration.free,
         tested: setup.calibration.tested,
         shape: None,
+        unseen: UnseenErrors::default(),
         tracking: None,
         solve: None,
         levels: Vec::new(),

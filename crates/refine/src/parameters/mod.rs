@@ -14,3 +14,4 @@ pub mod frame_estimate;
 pub mod shape;
 pub mod shape_limits;
 pub mod unknowns;
+pub mod unseen_errors;

@@ -23,7 +23,9 @@
 //! none had been looked for.
 //!
 //! The same L bounds what may hide below that: the strength of a dropped scale at which L has
-//! fallen by `½ z²` ([`LearnedShape::dropped_scales`]), z the quantile of the false-alarm rate.
+//! fallen by `½ z²`, z the quantile of the false-alarm rate, is what would have been seen
+//! ([`LearnedShape::dropped_scales`]); that at which it has fallen by ½, 1-σ, makes errors
+//! ([`LearnedShape::unseen_errors`]).
 //!
 //! A solve that ends for want of descent, as where the wall is not smooth, leaves a gradient that
 //! leads nowhere: then its end is taken for the minimum.
@@ -39,10 +41,12 @@ use crate::model::significance::normal_quantile;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::parameters::shape::{Functions, Scale, Shape, ShapeModel, ShapeStep};
+use crate::parameters::unseen_errors::{EXPECTED_SQUARE, UNSEEN_DRAWS, UnseenError, UnseenErrors};
 use crate::solver::gauss_newton::Solution;
 use nalgebra::SMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use std::ops::Range;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
@@ -121,6 +125,24 @@ struct Minimum<'f> {
     shared: Kappa,
     /// L, but for a constant.
     log_evidence: f64,
+}
+
+impl Minimum<'_> {
+    /// Step of slots and shared parameters that a gradient of the slots makes, with the shared
+    /// parameters `held` known.
+    fn response(
+        &self,
+        gradient: &[FrameStep],
+        held: &[bool; SHARED_PARAMETERS],
+    ) -> Option<(Vec<FrameStep>, Kappa)> {
+        match &self.schur {
+            Some(schur) => {
+                let step = schur.step(&self.factor, gradient, &Kappa::zeros())?;
+                schur.step_holding(step, &held.map(|held| held.then_some(0.0)))
+            }
+            None => Some((self.factor.step(gradient), Kappa::zeros())),
+        }
+    }
 }
 
 impl<'s> ShapeEquations<'s> {
@@ -306,8 +328,15 @@ impl LearnedShape<'_> {
     /// The dropped scales, with the largest strength that each may have but for the probability
     /// `alpha`, up to `most_m` metres; none if the equations are singular.
     pub fn dropped_scales(&self, most_m: f64, alpha: f64) -> Vec<Scale> {
+        let limits = self.strengths_where_evidence_falls(normal_quantile(alpha, 1), most_m);
+        limits.into_iter().map(|(_, scale)| scale).collect()
+    }
+
+    /// The dropped scales, with their indices, each with the strength up to `most_m` at which L has
+    /// fallen by `½ z²`; none if the equations are singular.
+    fn strengths_where_evidence_falls(&self, z: f64, most_m: f64) -> Vec<(usize, Scale)> {
         let scales = &self.equations.shape.model.scales;
-        let least = self.minimum.log_evidence - 0.5 * normal_quantile(alpha, 1).powi(2);
+        let least = self.minimum.log_evidence - 0.5 * z * z;
         let dropped: Vec<usize> = (0..scales.len()).filter(|k| self.dropped[*k]).collect();
         let limits = dropped.par_map(|k| {
             let scale = scales[*k];
@@ -320,12 +349,48 @@ impl LearnedShape<'_> {
                     false => below_m = sigmas_m[*k],
                 }
             }
-            Some(Scale {
+            let limit = Scale {
                 sigma_m: above_m,
                 ..scale
-            })
+            };
+            Some((*k, limit))
         });
         limits.into_iter().flatten().collect()
+    }
+
+    /// Draws the errors that the dropped scales make
+    /// ([module documentation](crate::parameters::unseen_errors)), with the shared parameters
+    /// `held` known; none if the equations are singular.
+    pub fn unseen_errors(&self, most_m: f64, held: &[bool; SHARED_PARAMETERS]) -> UnseenErrors {
+        let equations = &self.equations;
+        let admitted = self.strengths_where_evidence_falls(1.0, most_m);
+        let slots: Vec<Range<usize>> = equations.slots().collect();
+        let draws: Vec<u64> = match admitted.is_empty() {
+            true => Vec::new(),
+            false => (0..UNSEEN_DRAWS as u64).collect(),
+        };
+        let draws = draws.par_map(|draw| {
+            let mut rng = ChaCha8Rng::seed_from_u64(*draw);
+            let mut gradient = vec![FrameStep::zeros(); equations.pattern.columns()];
+            for (k, scale) in &admitted {
+                let information = self.sigmas_m[*k].powi(-2);
+                let amplitude = EXPECTED_SQUARE.sqrt() * scale.sigma_m * information;
+                for slot in slots[*k].clone() {
+                    gradient[slot] = FrameStep::from_fn(|_, _| StandardNormal.sample(&mut rng));
+                    gradient[slot] *= amplitude;
+                }
+            }
+            let (step, shared) = self.minimum.response(&gradient, held)?;
+            let (frames, shape) = step.split_at(equations.first_slot);
+            Some(UnseenError {
+                frames: frames.to_vec(),
+                shared,
+                displacement: equations.shape.model.field_of(shape.to_vec())?,
+            })
+        });
+        UnseenErrors {
+            draws: draws.into_iter().collect::<Option<_>>().unwrap_or_default(),
+        }
     }
 
     /// Step of all slots to the minimum.
@@ -371,7 +436,6 @@ impl LearnedShape<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_distr::{Distribution, StandardNormal};
     use tunnelstitch_geometry::surface::WallPoint;
 
     /// Every coefficient is observed with an error of 1 mm; those of one lattice are 5 mm, all
@@ -416,6 +480,23 @@ mod tests {
                 "{dropped:?}"
             );
         }
+        // What no pixel ties to the frame displaces the wall alone, by as much as L admits.
+        let admitted = learned.strengths_where_evidence_falls(1.0, 0.03);
+        let unseen = learned.unseen_errors(0.03, &[false; SHARED_PARAMETERS]);
+        let variance =
+            |(_, scale): &(usize, Scale)| (scale.functions.rms() * scale.sigma_m).powi(2);
+        let expected = EXPECTED_SQUARE * admitted.iter().map(variance).sum::<f64>();
+        let at = |k: usize| WallPoint {
+            s_m: (k as f64 * 7.3) % 18.0,
+            h_m: 1.0 + (k as f64 * 3.1) % 7.0,
+        };
+        let square = |error: &UnseenError| {
+            assert_eq!(error.frames, [FrameStep::zeros()]);
+            let squares = (0..100).map(|k| error.displacement.at(at(k)).delta_m.powi(2));
+            squares.sum::<f64>() / 100.0
+        };
+        let share = unseen.mean(square, 0.0) / expected;
+        assert!((0.6..1.5).contains(&share), "{share}");
         let learned = learned.shape_after(learned.step());
         let scales = &learned.model.scales;
         assert_eq!(scales.len(), 1, "{scales:?}");

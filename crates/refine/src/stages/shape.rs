@@ -11,6 +11,7 @@ use crate::parameters::shape::{Shape, ShapeModel, ShapeStep};
 use crate::parameters::shape_limits::{
     FIRST_FINEST_COLUMNS, MAX_PRIOR_SIGMAS, MAX_STRENGTH_SIGMAS, with_finer_lattice,
 };
+use crate::parameters::unseen_errors::UnseenErrors;
 use crate::samples::footprints::{extent_h_m, footprints};
 use crate::solver::gauss_newton::Solution;
 use crate::solver::shape_evidence::{LearnedShape, learn_shape};
@@ -79,6 +80,7 @@ fn adopt(setup: &Setup, state: &mut PipelineState, mut shape: Shape) {
         shape.model.scales.clear();
         shape.model.dropped.clear();
         shape.coefficients.clear();
+        state.unseen = UnseenErrors::default();
         if let Some(wall) = &setup.wall {
             shape.clone_from(&wall.shape);
         }
@@ -134,6 +136,8 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_l
     let stepped = solution
         .problem
         .stepped(&solution.linearised_at, &step, &shared);
+    let unseen = std::mem::take(&mut state.unseen);
+    state.unseen = unseen.plus(learned.unseen_errors(most_m, &tested));
     (state.free, state.tested) = (free, tested);
     setup.replace_kappa(state, stepped.kappa);
     for (estimate, stepped) in state.frames.estimates.iter_mut().zip(stepped.frames) {

@@ -175,7 +175,7 @@ fn uncertainty_of(
     }
     let solved = context.at(solution.unknowns.kappa);
     let alpha = setup.options.false_alarm_rate;
-    SolutionUncertainty::at(&solved, solution, &calibration, alpha).map(Some)
+    SolutionUncertainty::at(&solved, solution, &calibration, &state.unseen, alpha).map(Some)
 }
 
 /// The shared parameters that a full-size solution does not observe.

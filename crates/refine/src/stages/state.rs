@@ -3,6 +3,7 @@
 use crate::model::frame_states::FrameStates;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::shape::Shape;
+use crate::parameters::unseen_errors::UnseenErrors;
 use crate::refined::Refined;
 use crate::report::{LevelReport, StageTime};
 use crate::solver::gauss_newton::{Solution, SolveState};
@@ -37,6 +38,8 @@ pub struct PipelineState {
     pub tested: [bool; SHARED_PARAMETERS],
     /// The wall's shape, if it is estimated, from the first solve at full size on.
     pub shape: Option<Shape>,
+    /// Errors by deformation of the wall that is not seen.
+    pub unseen: UnseenErrors,
     /// Tracking, if it is under way.
     pub tracking: Option<AlternatingCalibration>,
     /// The global solve that is under way.

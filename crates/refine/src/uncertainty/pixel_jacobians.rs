@@ -7,6 +7,7 @@ use crate::parameters::calibration::{
 };
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::parameters::shape::FunctionValue;
+use crate::parameters::unseen_errors::UnseenError;
 use nalgebra::{Matrix2x6, SMatrix, Vector2};
 use std::collections::BTreeMap;
 use tunnelstitch_geometry::surface::{
@@ -26,6 +27,8 @@ pub struct PointJacobians {
     pub slots: BTreeMap<usize, SlotJacobian>,
     /// By the shared parameters.
     pub shared: KappaJacobian,
+    /// By the displacement of the wall, τ, and where.
+    pub wall: Option<(Vector2<f64>, WallPoint)>,
 }
 
 impl PointJacobians {
@@ -43,6 +46,15 @@ impl PointJacobians {
         let of_slots = self.slots.iter();
         let of_slots = of_slots.map(|(slot, jacobian)| jacobian * step(*slot));
         of_slots.sum::<Vector2<f64>>() + self.shared * shared
+    }
+
+    /// Movement of the point by an error that is not seen.
+    pub fn moved_by(&self, error: &UnseenError) -> Vector2<f64> {
+        let step = |slot: usize| error.frames.get(slot).copied().unwrap_or_default();
+        let of_wall = self.wall.map_or(Vector2::zeros(), |(tau, at)| {
+            tau * error.displacement.at(at).delta_m
+        });
+        self.moved(step, &error.shared) + of_wall
     }
 
     /// Adds the derivatives by the shape: `τ φᵀ`; `first`: slot of the shape's first block.

@@ -69,6 +69,7 @@ fn registration_jacobians(
     for j in others {
         add(j, -share);
     }
+    point.wall = Some((tau, hit.wall));
     if let Some(shape) = &context.shape {
         let functions = shape.model.functions_at(hit.wall);
         point.add_shape(&tau, &functions, estimates.len());

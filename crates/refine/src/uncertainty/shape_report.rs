@@ -147,7 +147,12 @@ impl EstimatedShape {
 fn error_draws(shape: &Shape, covariance: &TotalCovariance, first_slot: usize) -> Vec<RadialField> {
     let draws = covariance.error_draws(first_slot);
     let fields = draws.par_map(|coefficients| shape.model.field_of(coefficients.clone()));
-    fields.into_iter().flatten().collect()
+    let unseen = &covariance.unseen.draws;
+    let sum = |(k, field): (usize, RadialField)| match unseen.get(k % unseen.len().max(1)) {
+        Some(unseen) => field.plus(&unseen.displacement),
+        None => field,
+    };
+    fields.into_iter().flatten().enumerate().map(sum).collect()
 }
 
 /// 1-σ of the displacement by the prior alone, root mean square over a row in the middle of the
@@ -175,6 +180,7 @@ fn sigma_at(
 ) -> f64 {
     let mut displacement = PointJacobians::default();
     displacement.add_shape(&Vector2::x(), &model.functions_at(wall), first_slot);
+    displacement.wall = Some((Vector2::x(), wall));
     covariance.variance(&displacement).sqrt()
 }
 

@@ -8,6 +8,7 @@ use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
+use crate::parameters::unseen_errors::{UnseenError, UnseenErrors};
 use crate::problem::linearisation::FrameContribution;
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::MAX_MISFIT_SHARE;
@@ -40,7 +41,8 @@ pub struct SolutionUncertainty {
 
 impl SolutionUncertainty {
     /// Computes the uncertainty of a solution, with the free parameters of `calibration`;
-    /// `context`: with the solution's own κ and shape; `alpha`: rate of false alarms.
+    /// `context`: with the solution's own κ and shape; `unseen`: errors by
+    /// what is not seen of the wall's shape; `alpha`: rate of false alarms.
     ///
     /// # Errors
     /// [`ProblemError::Factor`] if shared parameters were estimated and the poses' normal matrix is
@@ -49,6 +51,7 @@ impl SolutionUncertainty {
         context: &EstimationContext,
         solution: &Solution,
         calibration: &Calibration,
+        unseen: &UnseenErrors,
         alpha: f64,
     ) -> Result<Self, ProblemError> {
         let problem = &solution.problem;
@@ -77,10 +80,16 @@ impl SolutionUncertainty {
                 if let (Some(shared), Some(errors)) = (&mut shared, &errors) {
                     *shared += errors.draws.of_shared();
                 }
+                // The draws of what is not seen have what the shared parameters do to frames.
                 let of_shared = posterior.zip(shared);
+                if let Some(shared) = &mut shared {
+                    let square = |draw: &UnseenError| draw.shared * draw.shared.transpose();
+                    *shared += unseen.mean(square, SharedBlock::zeros());
+                }
                 Some(TotalCovariance {
                     of_noise,
                     errors,
+                    unseen: unseen.clone(),
                     left: step_left(solution, &factor)?,
                     shared: of_shared.map(|(posterior, shared)| (posterior.w.clone(), shared)),
                 })
@@ -123,6 +132,7 @@ impl SolutionUncertainty {
             let pixel = pixel_jacobians(context, &estimate.pose, hit.wall, frame);
             let mut point = PointJacobians::default();
             point.add_pixel(k, &pixel, 1.0);
+            point.wall = Some((pixel.tau, hit.wall));
             if let Some(shape) = &context.shape {
                 point.add_shape(&pixel.tau, &shape.model.functions_at(hit.wall), frames);
             }

@@ -5,6 +5,7 @@ use crate::linear::bordered_system::{BorderBlock, SharedBlock};
 use crate::linear::normal_equations::Block;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameStep;
+use crate::parameters::unseen_errors::{UnseenError, UnseenErrors};
 use crate::uncertainty::covariance::{Covariances, NoiseCovariance};
 use crate::uncertainty::model_error::{ErrorDraws, EstimateErrors};
 use crate::uncertainty::pixel_jacobians::{KappaJacobian, PointJacobians};
@@ -16,6 +17,8 @@ pub struct TotalCovariance {
     pub of_noise: NoiseCovariance,
     /// By model errors and prior; None if the prior leaves a pose free.
     pub errors: Option<EstimateErrors>,
+    /// By deformation of the wall that is not seen.
+    pub unseen: UnseenErrors,
     /// W of all slots and `Σ_κ`, where the shared parameters were estimated.
     pub shared: Option<(Vec<BorderBlock>, SharedBlock)>,
     /// The undamped step of slots and shared parameters where the solve ended. Whether it would be
@@ -30,15 +33,20 @@ impl TotalCovariance {
         // What has nothing in common has no covariance, whatever draws say.
         let inverse = self.of_noise.inverse.block(j, k)?;
         let c = self.of_noise.pixel_dispersion;
-        let left = self.left.0[j] * self.left.0[k].transpose();
+        let of_unseen = |error: &UnseenError| match (error.frames.get(j), error.frames.get(k)) {
+            (Some(j), Some(k)) => j * k.transpose(),
+            _ => Block::zeros(),
+        };
+        let of_left = self.left.0[j] * self.left.0[k].transpose();
+        let beside = of_left + self.unseen.mean(of_unseen, Block::zeros());
         let total = match &self.errors {
             // Draws of patches include those of the shared parameters.
             Some(errors) if errors.patches.is_some() => {
-                return Some(errors.draws.of_pair(j, k) + left);
+                return Some(errors.draws.of_pair(j, k) + beside);
             }
             Some(errors) => inverse * c + errors.draws.of_pair(j, k) * (1.0 - c),
             None => inverse * c,
-        } + left;
+        } + beside;
         Some(match &self.shared {
             Some((w, covariance)) => total + w[j] * covariance * w[k].transpose(),
             None => total,
@@ -63,15 +71,17 @@ impl TotalCovariance {
     ///
     /// As slots move by `−W κ` with κ, what κ alone does is `K Σ_κ Kᵀ`, `K = C − Σ_j J_j W_j`.
     pub fn variance(&self, point: &PointJacobians) -> f64 {
-        let PointJacobians { slots, shared } = point;
+        let PointJacobians { slots, shared, .. } = point;
+        let of_unseen = |error: &UnseenError| point.moved_by(error).norm_squared();
         let of_left = point
             .moved(|slot| self.left.0[slot], &self.left.1)
             .norm_squared();
+        let beside = of_left + self.unseen.mean(of_unseen, 0.0);
         let c = self.of_noise.pixel_dispersion;
         let of_prior = match &self.errors {
             // Draws of patches include those of the shared parameters.
             Some(errors) if errors.patches.is_some() => {
-                return errors.draws.mean_square(point) + of_left;
+                return errors.draws.mean_square(point) + beside;
             }
             Some(errors) => (1.0 - c) * errors.draws.mean_square(point),
             None => 0.0,
@@ -90,7 +100,7 @@ impl TotalCovariance {
             let left = shared - moved;
             (left * covariance).dot(&left)
         });
-        c * of_pixels + of_prior + of_shared + of_left
+        c * of_pixels + of_prior + of_shared + beside
     }
 
     /// Draws of the errors of the slots from `first` on, by all causes; none if there is no shape,
