@@ -20,7 +20,7 @@ use crate::parameters::frame_estimate::FrameStep;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::surface::RadialField;
 
-/// Number of draws. A variance of six unknowns is known to 10 % by them.
+/// Number of draws. The sum of six independent variances is known to 10 % by them (1-σ).
 pub const UNSEEN_DRAWS: usize = 32;
 /// S over the square of the strength that the pixels admit.
 pub const EXPECTED_SQUARE: f64 = 0.24;

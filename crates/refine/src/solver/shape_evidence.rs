@@ -360,8 +360,13 @@ impl LearnedShape<'_> {
 
     /// Draws the errors that the dropped scales make
     /// ([module documentation](crate::parameters::unseen_errors)), with the shared parameters
-    /// `held` known; none if the equations are singular.
-    pub fn unseen_errors(&self, most_m: f64, held: &[bool; SHARED_PARAMETERS]) -> UnseenErrors {
+    /// `held` known; none if the equations are singular. `seed`: another one for every solve.
+    pub fn unseen_errors(
+        &self,
+        most_m: f64,
+        held: &[bool; SHARED_PARAMETERS],
+        seed: u64,
+    ) -> UnseenErrors {
         let equations = &self.equations;
         let admitted = self.strengths_where_evidence_falls(1.0, most_m);
         let slots: Vec<Range<usize>> = equations.slots().collect();
@@ -370,7 +375,8 @@ impl LearnedShape<'_> {
             false => (0..UNSEEN_DRAWS as u64).collect(),
         };
         let draws = draws.par_map(|draw| {
-            let mut rng = ChaCha8Rng::seed_from_u64(*draw);
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(*draw);
             let mut gradient = vec![FrameStep::zeros(); equations.pattern.columns()];
             for (k, scale) in &admitted {
                 let information = self.sigmas_m[*k].powi(-2);
@@ -482,7 +488,7 @@ mod tests {
         }
         // What no pixel ties to the frame displaces the wall alone, by as much as L admits.
         let admitted = learned.strengths_where_evidence_falls(1.0, 0.03);
-        let unseen = learned.unseen_errors(0.03, &[false; SHARED_PARAMETERS]);
+        let unseen = learned.unseen_errors(0.03, &[false; SHARED_PARAMETERS], 1);
         let variance =
             |(_, scale): &(usize, Scale)| (scale.functions.rms() * scale.sigma_m).powi(2);
         let expected = EXPECTED_SQUARE * admitted.iter().map(variance).sum::<f64>();

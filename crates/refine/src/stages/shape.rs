@@ -137,7 +137,8 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_l
         .problem
         .stepped(&solution.linearised_at, &step, &shared);
     let unseen = std::mem::take(&mut state.unseen);
-    state.unseen = unseen.plus(learned.unseen_errors(most_m, &tested));
+    let solves = state.levels.len() as u64;
+    state.unseen = unseen.plus(learned.unseen_errors(most_m, &tested, solves));
     (state.free, state.tested) = (free, tested);
     setup.replace_kappa(state, stepped.kappa);
     for (estimate, stepped) in state.frames.estimates.iter_mut().zip(stepped.frames) {

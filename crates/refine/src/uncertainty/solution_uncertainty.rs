@@ -41,8 +41,8 @@ pub struct SolutionUncertainty {
 
 impl SolutionUncertainty {
     /// Computes the uncertainty of a solution, with the free parameters of `calibration`;
-    /// `context`: with the solution's own κ and shape; `unseen`: errors by
-    /// what is not seen of the wall's shape; `alpha`: rate of false alarms.
+    /// `context`: with the solution's own κ and shape; `unseen`: errors by what is
+    /// not seen of the wall's shape; `alpha`: rate of false alarms.
     ///
     /// # Errors
     /// [`ProblemError::Factor`] if shared parameters were estimated and the poses' normal matrix is
