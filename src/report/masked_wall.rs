@@ -1,12 +1,10 @@
 //! Map of the wall that was left out, in the report.
 
+use crate::evaluate::deformation::PageCells;
 use crate::survey::MaskedWall;
 use serde::{Deserialize, Serialize};
 
-/// Cells of the map around the section.
-const AROUND: usize = 180;
-/// Largest number of cells of the map along the axis.
-const MAX_ALONG: usize = 2000;
+const AROUND: usize = PageCells::AROUND;
 
 /// Share of the frames that were left out because they show something else than the wall. Lists are
 /// row-major: a row for each cell along the axis, which begins at θ = 0.
@@ -29,11 +27,11 @@ impl MaskedMap {
         let (first, last) = (masked.seen().first()?.0, masked.seen().last()?.0);
         let [from_m, to_m] = [first, last + 1].map(|row| masked.corner(row, 0).h_m);
         let [width_m, _] = masked.tile_size_m();
-        let cell_m = width_m * masked.columns() as f64 / AROUND as f64;
-        let along = (((to_m - from_m) / cell_m).ceil() as usize).clamp(1, MAX_ALONG);
+        let perimeter_m = width_m * masked.columns() as f64;
+        let PageCells { along, side_m } = PageCells::new([from_m, to_m], perimeter_m);
         let cell_of = |row: i64, column: i64| {
             let corner = masked.corner(row, column);
-            let around = ((corner.s_m + 0.5 * width_m) / cell_m).floor() as i64;
+            let around = ((corner.s_m + 0.5 * width_m) / side_m).floor() as i64;
             let share = (corner.h_m - from_m) / (to_m - from_m);
             let row = ((share * along as f64) as usize).min(along - 1);
             row * AROUND + around.rem_euclid(AROUND as i64) as usize

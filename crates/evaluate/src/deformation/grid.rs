@@ -5,10 +5,32 @@ use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::WallPoint;
 
-/// Cells of the grid around the section.
-const AROUND: usize = 180;
-/// Largest number of cells of the grid along the axis.
-const MAX_ALONG: usize = 2000;
+/// Cells of a map of the unrolled wall on a page: 180 around the section, and square unless the
+/// tunnel is very long.
+#[derive(Clone, Copy, Debug)]
+pub struct PageCells {
+    /// Number of cells along the axis.
+    pub along: usize,
+    /// Side of a cell, metres.
+    pub side_m: f64,
+}
+
+impl PageCells {
+    /// Number of cells around the section.
+    pub const AROUND: usize = 180;
+    /// Largest number of cells along the axis.
+    const MAX_ALONG: usize = 2000;
+
+    /// The cells of a wall between two chainages, metres.
+    pub fn new([from_m, to_m]: [f64; 2], perimeter_m: f64) -> Self {
+        let side_m = perimeter_m / Self::AROUND as f64;
+        let along = ((to_m - from_m) / side_m).ceil() as usize;
+        Self {
+            along: along.clamp(1, Self::MAX_ALONG),
+            side_m,
+        }
+    }
+}
 
 /// Deviation over the wall. Lists are row-major: a row for each cell along the axis, which begins
 /// at θ = 0.
@@ -32,17 +54,15 @@ impl DeviationGrid {
     /// The grid of a map; None if nothing is determined.
     pub fn new(map: &DeviationMap) -> Option<Self> {
         let [from_m, to_m] = map.chainage_m()?;
-        let cell_m = map.perimeter_m() / AROUND as f64;
-        let along = ((to_m - from_m) / cell_m).ceil() as usize;
-        let along = along.clamp(1, MAX_ALONG);
+        let PageCells { along, side_m } = PageCells::new([from_m, to_m], map.perimeter_m());
         let rows = (0..along).par_map(|row| {
             let share = (row as f64 + 0.5) / along as f64;
             let h_m = from_m + share * (to_m - from_m);
             let at = |column: usize| {
-                let s_m = (column as f64 + 0.5) * cell_m;
+                let s_m = (column as f64 + 0.5) * side_m;
                 map.at_mm(WallPoint { s_m, h_m })
             };
-            (0..AROUND).map(at).collect::<Vec<[f32; 2]>>()
+            (0..PageCells::AROUND).map(at).collect::<Vec<[f32; 2]>>()
         });
         let part = |which: usize| {
             let rounded = |value: f32| {
@@ -53,7 +73,7 @@ impl DeviationGrid {
             cells.map(|cell| rounded(cell[which])).collect()
         };
         Some(Self {
-            around: AROUND,
+            around: PageCells::AROUND,
             along,
             chainage_m: [from_m, to_m],
             deviation_mm: part(0),

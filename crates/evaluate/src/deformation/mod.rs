@@ -52,7 +52,7 @@ mod shape_estimate;
 mod test_fields;
 
 pub use deviation::{Deviation, DeviationMap, MAX_SIGMA_SHARE, deviation_sigmas_m};
-pub use grid::DeviationGrid;
+pub use grid::{DeviationGrid, PageCells};
 pub use profile::SectionProfile;
 pub use section::{SectionDeformation, measure_sections};
 pub use sections_file::{clock_position, read_sections, sections_csv};

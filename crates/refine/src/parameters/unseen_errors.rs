@@ -18,6 +18,8 @@
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameStep;
 use serde::{Deserialize, Serialize};
+use std::iter::Sum;
+use std::ops::Div;
 use tunnelstitch_geometry::surface::RadialField;
 
 /// Number of draws. The sum of six independent variances is known to 10 % by them (1-σ).
@@ -64,11 +66,7 @@ impl UnseenErrors {
     }
 
     /// The mean of a figure over the draws; zero if there are none.
-    pub fn mean<T>(&self, figure: impl Fn(&UnseenError) -> T, zero: T) -> T
-    where
-        T: std::ops::Add<Output = T> + std::ops::Div<f64, Output = T>,
-    {
-        let sum = self.draws.iter().map(figure).fold(zero, |a, b| a + b);
-        sum / self.draws.len().max(1) as f64
+    pub fn mean<T: Sum + Div<f64, Output = T>>(&self, figure: impl Fn(&UnseenError) -> T) -> T {
+        self.draws.iter().map(figure).sum::<T>() / self.draws.len().max(1) as f64
     }
 }

@@ -6,7 +6,7 @@ use crate::parameters::calibration::{
     BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa, SHARED_PARAMETERS,
 };
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
-use crate::parameters::shape::FunctionValue;
+use crate::parameters::shape::ShapeModel;
 use crate::parameters::unseen_errors::UnseenError;
 use nalgebra::{Matrix2x6, SMatrix, Vector2};
 use std::collections::BTreeMap;
@@ -57,9 +57,17 @@ impl PointJacobians {
         self.moved(step, &error.shared) + of_wall
     }
 
-    /// Adds the derivatives by the shape: `τ φᵀ`; `first`: slot of the shape's first block.
-    pub fn add_shape(&mut self, tau: &Vector2<f64>, functions: &[FunctionValue], first: usize) {
-        for function in functions {
+    /// Adds the derivatives by the displacement of the wall at `wall`: τ, and `τ φᵀ` by the
+    /// coefficients of the shape, if one was estimated; `first`: slot of its first block.
+    pub fn add_wall(
+        &mut self,
+        tau: Vector2<f64>,
+        wall: WallPoint,
+        shape: Option<&ShapeModel>,
+        first: usize,
+    ) {
+        self.wall = Some((tau, wall));
+        for function in shape.map_or_else(Vec::new, |shape| shape.functions_at(wall)) {
             let slot = self.slots.entry(first + function.block).or_default();
             let mut target = slot.column_mut(function.component);
             target += tau * function.value;

@@ -69,11 +69,8 @@ fn registration_jacobians(
     for j in others {
         add(j, -share);
     }
-    point.wall = Some((tau, hit.wall));
-    if let Some(shape) = &context.shape {
-        let functions = shape.model.functions_at(hit.wall);
-        point.add_shape(&tau, &functions, estimates.len());
-    }
+    let model = context.shape.as_ref().map(|shape| &shape.model);
+    point.add_wall(tau, hit.wall, model, estimates.len());
     Some(point)
 }
 

@@ -179,8 +179,7 @@ fn sigma_at(
     wall: WallPoint,
 ) -> f64 {
     let mut displacement = PointJacobians::default();
-    displacement.add_shape(&Vector2::x(), &model.functions_at(wall), first_slot);
-    displacement.wall = Some((Vector2::x(), wall));
+    displacement.add_wall(Vector2::x(), wall, Some(model), first_slot);
     covariance.variance(&displacement).sqrt()
 }
 

@@ -84,7 +84,7 @@ impl SolutionUncertainty {
                 let of_shared = posterior.zip(shared);
                 if let Some(shared) = &mut shared {
                     let square = |draw: &UnseenError| draw.shared * draw.shared.transpose();
-                    *shared += unseen.mean(square, SharedBlock::zeros());
+                    *shared += unseen.mean(square);
                 }
                 Some(TotalCovariance {
                     of_noise,
@@ -132,10 +132,8 @@ impl SolutionUncertainty {
             let pixel = pixel_jacobians(context, &estimate.pose, hit.wall, frame);
             let mut point = PointJacobians::default();
             point.add_pixel(k, &pixel, 1.0);
-            point.wall = Some((pixel.tau, hit.wall));
-            if let Some(shape) = &context.shape {
-                point.add_shape(&pixel.tau, &shape.model.functions_at(hit.wall), frames);
-            }
+            let model = context.shape.as_ref().map(|shape| &shape.model);
+            point.add_wall(pixel.tau, hit.wall, model, frames);
             Some(total.variance(&point))
         };
         FrameSigma {

@@ -38,7 +38,7 @@ impl TotalCovariance {
             _ => Block::zeros(),
         };
         let of_left = self.left.0[j] * self.left.0[k].transpose();
-        let beside = of_left + self.unseen.mean(of_unseen, Block::zeros());
+        let beside = of_left + self.unseen.mean(of_unseen);
         let total = match &self.errors {
             // Draws of patches include those of the shared parameters.
             Some(errors) if errors.patches.is_some() => {
@@ -76,7 +76,7 @@ impl TotalCovariance {
         let of_left = point
             .moved(|slot| self.left.0[slot], &self.left.1)
             .norm_squared();
-        let beside = of_left + self.unseen.mean(of_unseen, 0.0);
+        let beside = of_left + self.unseen.mean(of_unseen);
         let c = self.of_noise.pixel_dispersion;
         let of_prior = match &self.errors {
             // Draws of patches include those of the shared parameters.
