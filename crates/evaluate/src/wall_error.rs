@@ -3,11 +3,13 @@
 use crate::error::EvaluateError;
 use crate::error::check_pairs;
 use crate::error_statistics::{ErrorStatistics, root_mean_square};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Surface, WallPoint, gauge_component, shortest_arc};
+use tunnelstitch_geometry::surface::{
+    Surface, SurfaceError, gauge_component, shortest_arc, sighted_wall, viewing_distance,
+};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// Maximum iterations of the mean of arcs.
@@ -123,27 +125,34 @@ pub(super) fn frame_offsets(
     estimate: &Pose,
     truth: &Pose,
 ) -> Result<FrameOffsets, EvaluateError> {
-    let hit = |pose: &Pose, which, ray: &Vector3<f64>| {
-        surface
-            .hit(&pose.t_wc, &(pose.r_wc * *ray))
-            .map_err(|source| EvaluateError::Frame {
-                frame,
-                which,
-                source,
-            })
+    let failed = |which| {
+        move |source| EvaluateError::Frame {
+            frame,
+            which,
+            source,
+        }
     };
     let (mut delta_s_m, mut delta_h_m) = (Vec::new(), Vec::new());
-    // Pixels without a ray are left out.
+    // Pixels without a ray are left out, and those that truly show wall beyond the range.
     for ray in camera.grid_rays() {
-        let here: WallPoint = hit(estimate, "estimated", &ray)?.wall;
-        let there: WallPoint = hit(truth, "true", &ray)?.wall;
+        let there = match sighted_wall(surface, camera, truth, &ray) {
+            Ok(hit) => hit.wall,
+            Err(SurfaceError::Parallel | SurfaceError::BeyondRange { .. }) => continue,
+            Err(source) => return Err(failed("true")(source)),
+        };
+        let ray_w = estimate.r_wc * ray;
+        let here = surface
+            .hit(&estimate.t_wc, &ray_w)
+            .map_err(failed("estimated"))?
+            .wall;
         delta_s_m.push(here.s_m - there.s_m);
         delta_h_m.push(here.h_m - there.h_m);
     }
     Ok(FrameOffsets {
         delta_s_m,
         delta_h_m,
-        pixel_m: hit(truth, "true", &Vector3::z())?.range / camera.focal_px(),
+        pixel_m: viewing_distance(surface, camera, truth).map_err(failed("true"))?
+            / camera.focal_px(),
     })
 }
 

@@ -5,7 +5,7 @@ use super::observation::{LinearisedPoint, Observation, Unknowns};
 use super::priors::Priors;
 use nalgebra::SVector;
 use rayon::prelude::*;
-use tunnelstitch_core::frames::{MAD_TO_SIGMA, SHADING_TERMS};
+use tunnelstitch_core::frames::{MAD_TO_SIGMA, SHADING_TERMS, Shading};
 
 /// Reweighting iterations at the most: it takes ten until glints weigh nothing, and three leave the
 /// shading 0.7 % off.
@@ -33,14 +33,25 @@ pub struct PhotometricCalibration {
 }
 
 impl PhotometricCalibration {
-    /// Calibrates `frames` frames of `size` pixels by their observations of wall `points`; `None`
-    /// if no point is observed twice or the normal matrix is not positive definite.
+    /// Calibrates `frames` frames of the size of `known`, the shading that is known already, by
+    /// their observations of wall `points`; `None` if no point is observed twice or the normal
+    /// matrix is not positive definite.
+    ///
+    /// The prior holds for all of the shading, what is known included. Noise is independent from
+    /// point to point, but what the model leaves out (things that are not of the wall, wall that is
+    /// misregistered, other light) is as smooth as the shading: a frame has [`SHADING_TERMS`] of
+    /// such errors at the most, and no more independent readings of the shading, however many
+    /// points it observes. With n observations by m frames the prior therefore has
+    /// `n/(m SHADING_TERMS)` times its weight. A direction of the shading that the overlaps hardly
+    /// determine, such as that along the tunnel in a single turn, then stays at the prior: no
+    /// shading.
     pub fn solve(
         points: &[Vec<Observation>],
         frames: usize,
-        size: (usize, usize),
+        known: &Shading,
         priors: &Priors,
     ) -> Option<Self> {
+        let size = known.size();
         let mut x = Unknowns::zeros(frames);
         let mut variance = f64::INFINITY;
         let mut solution = None;
@@ -48,7 +59,13 @@ impl PhotometricCalibration {
             let mut sums = Sums::of(points, size, &x, variance);
             let before = variance;
             variance = sums.variance()?;
-            let solved = sums.normal.solve(priors, variance)?;
+            let independent = (frames * SHADING_TERMS) as f64;
+            let weight = (sums.sizes.len() as f64 / independent).max(1.0);
+            let priors = Priors {
+                shading_sigma: priors.shading_sigma / weight.sqrt(),
+                ..*priors
+            };
+            let solved = sums.normal.solve(&priors, variance, known.coefficients())?;
             x.clone_from(&solved.x);
             solution = Some(solved);
             if (variance - before).abs() < SETTLED_VARIANCE_CHANGE * variance {
@@ -203,14 +220,18 @@ mod tests {
 
         fn solve(&self, count: usize, rng: &mut ChaCha8Rng) -> PhotometricCalibration {
             let points = self.points(count, rng);
-            PhotometricCalibration::solve(&points, FRAMES, SIZE, &PRIORS).unwrap()
+            PhotometricCalibration::solve(&points, FRAMES, &Shading::none(SIZE), &PRIORS).unwrap()
         }
     }
 
     fn differs(found: &[f64; SHADING_TERMS], truth: &[f64; SHADING_TERMS]) -> f64 {
         let none = Shading::none(SIZE);
+        let place = |k: usize, steps: usize, of: usize| (k * (of - 1)) as f64 / steps as f64;
+        let pixels = (0..25 * 33).map(|k| {
+            nalgebra::Vector2::new(place(k % 33, 32, SIZE.0), place(k / 33, 24, SIZE.1))
+        });
         none.changed(found)
-            .relative_difference(&none.changed(truth))
+            .relative_difference(&none.changed(truth), pixels)
     }
 
     #[test]
@@ -309,7 +330,7 @@ mod tests {
     fn points_seen_once_calibrate_nothing() {
         let once = Observation::new(0, [3.0, 4.0], 100.0, 1.0).unwrap();
         let points = [vec![once], Vec::new()];
-        assert!(PhotometricCalibration::solve(&points, 1, SIZE, &PRIORS).is_none());
-        assert!(PhotometricCalibration::solve(&[], 1, SIZE, &PRIORS).is_none());
+        assert!(PhotometricCalibration::solve(&points, 1, &Shading::none(SIZE), &PRIORS).is_none());
+        assert!(PhotometricCalibration::solve(&[], 1, &Shading::none(SIZE), &PRIORS).is_none());
     }
 }

@@ -122,13 +122,24 @@ impl NormalEquations {
         add_all(&mut self.right, &other.right);
     }
 
-    /// Solves `(N + σ² P) x = g` with P the inverse variances of the priors and σ² the `variance`
-    /// of the residuals; `None` if the matrix is not positive definite.
-    pub fn solve(&self, priors: &Priors, variance: f64) -> Option<Solution> {
+    /// Solves `(N + σ² P) x = g − σ² P x₀` with P the inverse variances of the priors, σ² the
+    /// `variance` of the residuals, and x₀ the `known` shading, to which x is added; `None` if the
+    /// matrix is not positive definite.
+    pub fn solve(
+        &self,
+        priors: &Priors,
+        variance: f64,
+        known: &[f64; SHADING_TERMS],
+    ) -> Option<Solution> {
         let n = self.right.len();
         let matrix = SparseColMat::try_new_from_triplets(n, n, &self.lower(priors, variance));
         let factor = matrix.ok()?.sp_cholesky(Side::Lower).ok()?;
-        let x = factor.solve(&Col::from_fn(n, |k| self.right[k]));
+        let shading_prior = variance / (priors.shading_sigma * priors.shading_sigma);
+        let shading = self.border.len();
+        let x = factor.solve(&Col::from_fn(n, |k| {
+            let known = k.checked_sub(shading).map_or(0.0, |term| known[term]);
+            self.right[k] - shading_prior * known
+        }));
         if !x.iter().all(|value| value.is_finite()) {
             return None;
         }
@@ -334,7 +345,7 @@ mod tests {
         }
         sparse.fill_upper_triangle_with_lower_triangle();
         assert!((&sparse - &matrix).amax() < 1e-10);
-        let cofactors = normal.solve(&PRIORS, VARIANCE).unwrap().shading_cofactors();
+        let cofactors = normal.solve(&PRIORS, VARIANCE, &[0.0; SHADING_TERMS]).unwrap().shading_cofactors();
         let inverse = matrix.try_inverse().unwrap();
         let expected = inverse.view_range(FRAME_UNKNOWNS * FRAMES.., FRAME_UNKNOWNS * FRAMES..);
         assert!((cofactors - expected).amax() < 1e-8 * expected.amax());

@@ -28,6 +28,11 @@ pub struct Observation {
 }
 
 impl Observation {
+    /// The pixel at which the point appears, of the frame's full size.
+    pub fn pixel(&self) -> Vector2<f64> {
+        Vector2::from(self.pixel).cast()
+    }
+
     /// An observation of the value `z = (I − bias)/f`; `None` if the frame is too dark there to
     /// determine a factor or so bright that it may be clipped.
     pub fn new(frame: usize, pixel: [f32; 2], value: f32, factor: f32) -> Option<Self> {

@@ -9,8 +9,8 @@ pub struct Priors {
     /// Of β, a frame's bias, grey levels. On a wall of low contrast bias and gain are hardly told
     /// apart; a wide prior leaves that to noise.
     pub bias_sigma_grey: f64,
-    /// Of the shading's coefficients `c_k` around what is known: keeps terms that the overlaps do
-    /// not determine near 0.
+    /// Of the coefficients `c_k` of the whole shading: keeps terms that the overlaps do not
+    /// determine near 0.
     pub shading_sigma: f64,
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tunnelstitch_core::frames::FrameSet;
 use tunnelstitch_core::survey::{CalibrateSection, DEFAULT_SHAPE_SIGMA_RADII, Survey};
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Bend, RadialField, Surface, WallRegions};
+use tunnelstitch_geometry::surface::{Bend, RadialField, Surface, WallRegions, with_range};
 use tunnelstitch_geometry::trajectory::{Jitter, Shutter, StampedPose};
 
 /// No part of the wall.
@@ -64,7 +64,7 @@ impl<'a> RefineInput<'a> {
         prior: Jitter,
     ) -> Self {
         Self {
-            camera,
+            camera: with_range(&camera, surface.as_ref()),
             bend: None,
             displacement: None,
             shape_sigma_m: DEFAULT_SHAPE_SIGMA_RADII * surface.perimeter_m() / TAU,

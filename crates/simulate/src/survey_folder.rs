@@ -149,6 +149,7 @@ fn write_text_files(
             file: "camera.json".into(),
             name: None,
             readout_ms: (options.readout_ms != 0.0).then_some(options.readout_ms),
+            max_range_m: None,
         },
         frames: FramesSection {
             images: Some("frames/*.png".to_owned()),

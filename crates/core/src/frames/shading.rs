@@ -66,6 +66,11 @@ impl Shading {
         }
     }
 
+    /// Width and height of the pictures, pixels.
+    pub fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
     /// The coefficients `c_k`.
     pub fn coefficients(&self) -> &[f64; TERMS] {
         &self.coefficients
@@ -112,12 +117,20 @@ impl Shading {
         range
     }
 
-    /// The largest relative difference of two shadings of the same pictures once their exposures
-    /// are made equal: half of the spread of `ln V/V'`.
-    pub fn relative_difference(&self, other: &Self) -> f64 {
+    /// The largest relative difference of two shadings of the same pictures over some pixels, once
+    /// their exposures are made equal: half of the spread of `ln V/V'`; 0 without pixels.
+    pub fn relative_difference(
+        &self,
+        other: &Self,
+        pixels: impl IntoIterator<Item = Vector2<f64>>,
+    ) -> f64 {
         let ratio = self.changed(&other.coefficients.map(|c| -c));
-        let [least, greatest] = ratio.range();
-        0.5 * (greatest / least).ln()
+        let nothing = [f64::INFINITY, f64::NEG_INFINITY];
+        let logs = pixels.into_iter().map(|pixel| ratio.at(&pixel).ln());
+        let [least, greatest] = logs.fold(nothing, |[least, greatest], log| {
+            [least.min(log), greatest.max(log)]
+        });
+        (0.5 * (greatest - least)).max(0.0)
     }
 
     /// Divides a full-size picture by V.
@@ -212,12 +225,14 @@ mod tests {
         // P_1(x), from −1 to 1.
         delta[0] = 0.03;
         let sloped = none.changed(&delta);
-        assert!((sloped.relative_difference(&none) - 0.03).abs() < 1e-12);
+        let pixels = || [0.0, 31.0, 63.0].map(|x| Vector2::new(x, 20.0));
+        let difference = |a: &Shading, b: &Shading| a.relative_difference(b, pixels());
+        assert!((difference(&sloped, &none) - 0.03).abs() < 1e-12);
         assert_eq!(
-            sloped.relative_difference(&none),
-            none.relative_difference(&sloped)
+            difference(&sloped, &none),
+            difference(&none, &sloped)
         );
-        assert_eq!(sloped.relative_difference(&sloped), 0.0);
+        assert_eq!(difference(&sloped, &sloped), 0.0);
     }
 
     #[test]

@@ -71,6 +71,9 @@ pub struct CameraSection {
     /// its middle row. Without it, all rows are read at once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub readout_ms: Option<f64>,
+    /// Distance from the camera up to which the wall is used, metres; six radii by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_range_m: Option<f64>,
 }
 
 /// `[frames]`.
@@ -192,6 +195,7 @@ mod tests {
                 file: "camera.json".into(),
                 name: None,
                 readout_ms: Some(-20.0),
+                max_range_m: Some(9.0),
             },
             frames: FramesSection {
                 images: None,

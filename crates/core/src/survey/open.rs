@@ -14,7 +14,9 @@ use crate::frames::{FrameSet, Mask};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
-use tunnelstitch_geometry::surface::{Bend, RadialField, Surface, WallRegions, bent, displaced};
+use tunnelstitch_geometry::surface::{
+    Bend, RadialField, Surface, WallRegions, bent, displaced, with_range,
+};
 use tunnelstitch_geometry::trajectory::{
     Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of, read_tunnel_frame,
 };
@@ -103,8 +105,16 @@ impl Survey {
         let displacement = found.and_then(|found| found.displacement());
         let surface = displaced(&nominal, displacement.clone());
         check_values(&file).map_err(value)?;
-        let camera =
+        let calibrated =
             read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
+        let max_range_m = file.camera.max_range_m.unwrap_or(calibrated.max_range_m);
+        let camera = with_range(
+            &Camera {
+                max_range_m,
+                ..calibrated
+            },
+            surface.as_ref(),
+        );
         let FrameList {
             frames,
             times_s,
@@ -377,6 +387,15 @@ fn check_values(file: &SurveyFile) -> Result<(), String> {
             "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times \
              the radius (half the width)",
             prior.translation_sigma_m
+        ));
+    }
+    let radius_m = file.tunnel.nominal_m();
+    if let Some(max_range_m) = file.camera.max_range_m
+        && !(radius_m..=1e3 * radius_m).contains(&max_range_m)
+    {
+        return Err(format!(
+            "camera.max_range_m is {max_range_m}; it must be metres, between the radius (half the \
+             width) and a thousand times that"
         ));
     }
     if let Some(calibrate) = &file.calibrate {

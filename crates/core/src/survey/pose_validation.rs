@@ -61,7 +61,7 @@ impl PoseSummary {
     }
 
     fn is_wrong(&self) -> bool {
-        self.frames >= MIN_FRAMES && self.share(self.outside.max(self.axial)) > MAX_WRONG_FRACTION
+        self.frames >= MIN_FRAMES && self.share(self.outside) > MAX_WRONG_FRACTION
     }
 
     fn is_right(&self) -> bool {

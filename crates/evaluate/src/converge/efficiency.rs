@@ -16,7 +16,7 @@ use tunnelstitch_core::persist::atomic::{self, ScratchFolder};
 use tunnelstitch_core::progress::{Progress, Silent};
 use tunnelstitch_core::survey::Survey;
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Surface, wall_jacobian};
+use tunnelstitch_geometry::surface::{Surface, sighted_wall, wall_jacobian};
 use tunnelstitch_geometry::trajectory::{Pose, poses_of};
 use tunnelstitch_refine::{
     Covariances, FINER, PoseBounds, RefineOptions, UnknownTexture, pose_bounds, refine,
@@ -130,8 +130,7 @@ impl MeanSquares {
         self.translation += trace(3);
         let (mut wall, mut points) = (0.0, 0.0);
         for ray_c in camera.corner_and_centre_rays() {
-            let ray = pose.r_wc * ray_c;
-            if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
+            if let Ok(hit) = sighted_wall(surface, camera, pose, &ray_c) {
                 let a = wall_jacobian(pose, &surface.frame(hit.wall));
                 wall += (a * square * a.transpose()).trace() * (camera.fy / hit.range).powi(2);
                 points += 1.0;

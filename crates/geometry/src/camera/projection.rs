@@ -31,6 +31,9 @@ pub struct Camera {
     pub lens: Lens,
     /// The camera's motion during the readout of an image, different for each frame of a survey.
     pub sweep: Sweep,
+    /// Distance from the camera up to which the wall is used, metres; beyond, a pixel shows too much
+    /// of it to tell anything.
+    pub max_range_m: f64,
 }
 
 /// Bisection steps that find the edge of the lens's field of view towards a border pixel.
@@ -55,6 +58,7 @@ impl Camera {
             cy: 0.5 * (f64::from(height) - 1.0),
             lens: Lens::default(),
             sweep: Sweep::default(),
+            max_range_m: f64::INFINITY,
         }
     }
 
@@ -231,6 +235,7 @@ impl Camera {
             cy: (self.cy + 0.5) * scale - 0.5,
             lens: self.lens,
             sweep: self.sweep,
+            max_range_m: self.max_range_m,
         }
     }
 
@@ -246,6 +251,7 @@ impl Camera {
             cy: scale * self.cy + 0.5 * (scale - 1.0),
             lens: self.lens,
             sweep: self.sweep,
+            max_range_m: self.max_range_m,
         }
     }
 
@@ -339,6 +345,7 @@ mod tests {
             cy: 241.0,
             lens: Lens::radial(-0.06, 0.01),
             sweep: Sweep::default(),
+            max_range_m: f64::INFINITY,
         }
     }
 

@@ -24,6 +24,14 @@ pub enum SurfaceError {
              end"
     )]
     LooksAlongTheAxis,
+    /// The wall that a ray meets is beyond the camera's range.
+    #[error("the wall is {range_m:.3} m away, beyond camera.max_range_m = {max_range_m:.3} m")]
+    BeyondRange {
+        /// Distance of the wall, metres.
+        range_m: f64,
+        /// Range of the camera, metres.
+        max_range_m: f64,
+    },
     /// The image's centre lies outside the lens's field of view.
     #[error(
         "the image's centre is outside the lens's field of view; check the principal point and \

@@ -2,9 +2,10 @@
 
 use super::error::SurfaceError;
 use super::shape::Surface;
+use super::sight::sighted_wall;
 use crate::camera::Camera;
 use crate::trajectory::Pose;
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Rays along each edge of a frame. The bounding box of the curved outline is too small by the
@@ -37,6 +38,39 @@ pub struct Footprint {
 }
 
 impl Footprint {
+    /// Traces the part of the wall that a frame shows within the camera's range.
+    ///
+    /// A frame that contains the tunnel's vanishing point sees the full circumference without end:
+    /// its box covers all of `s`, and goes from the nearest wall on its border to the range.
+    ///
+    /// # Errors
+    /// A camera outside the tunnel; for a camera of unlimited range, the errors of
+    /// [`Footprint::outline`].
+    pub fn trace(
+        surface: &dyn Surface,
+        camera: &Camera,
+        pose: &Pose,
+    ) -> Result<Self, SurfaceError> {
+        let outline = Self::outline(surface, camera, pose);
+        if camera.max_range_m.is_infinite() {
+            return outline;
+        }
+        let h_m = surface.chainage_m(&pose.t_wc);
+        let clamp = |end_m: f64| end_m.clamp(h_m - camera.max_range_m, h_m + camera.max_range_m);
+        match outline {
+            Ok(footprint) => Ok(Self {
+                h_min_m: clamp(footprint.h_min_m),
+                h_max_m: clamp(footprint.h_max_m),
+                ..footprint
+            }),
+            Err(SurfaceError::Parallel | SurfaceError::LooksAlongTheAxis) => {
+                surface.check_inside(&pose.t_wc)?;
+                Ok(Self::along_the_tunnel(surface, camera, pose))
+            }
+            Err(error) => Err(error),
+        }
+    }
+
     /// Traces the frame's border, through the outermost pixel centres, on the wall.
     ///
     /// The map from pixel to wall is smooth and injective, so `s` and `h` take their extremes on
@@ -46,11 +80,7 @@ impl Footprint {
     /// A camera outside the tunnel; [`SurfaceError::Parallel`] for a border pixel that looks along
     /// the axis; [`SurfaceError::LooksAlongTheAxis`] if the axis's vanishing point lies within the
     /// image.
-    pub fn trace(
-        surface: &dyn Surface,
-        camera: &Camera,
-        pose: &Pose,
-    ) -> Result<Self, SurfaceError> {
+    fn outline(surface: &dyn Surface, camera: &Camera, pose: &Pose) -> Result<Self, SurfaceError> {
         let perimeter_m = surface.perimeter_m();
         let wall = |pixel: &Vector2<f64>| {
             let ray = camera.ray(pixel.x, pixel.y).ok_or(SurfaceError::NotShown)?;
@@ -93,38 +123,35 @@ impl Footprint {
         Ok(footprint)
     }
 
-    /// Traces the footprint of any view, cut off at `reach_m` along the tunnel from the camera.
-    ///
-    /// A frame that contains the tunnel's vanishing point sees the full circumference without end:
-    /// its box covers all of `s` on both sides of the camera, up to the reach.
-    ///
-    /// # Errors
-    /// [`SurfaceError::CameraOutside`], [`SurfaceError::NotFinite`].
-    pub fn within(
-        surface: &dyn Surface,
-        camera: &Camera,
-        pose: &Pose,
-        reach_m: f64,
-    ) -> Result<Self, SurfaceError> {
+    /// The box of a frame that looks along the tunnel: all around, from the nearest wall on its
+    /// border to the camera's range.
+    fn along_the_tunnel(surface: &dyn Surface, camera: &Camera, pose: &Pose) -> Self {
         let h_m = surface.chainage_m(&pose.t_wc);
-        let near_m = h_m - reach_m..=h_m + reach_m;
-        let clamp = |h_m: f64| h_m.clamp(*near_m.start(), *near_m.end());
-        match Self::trace(surface, camera, pose) {
-            Ok(footprint) => Ok(Self {
-                h_min_m: clamp(footprint.h_min_m),
-                h_max_m: clamp(footprint.h_max_m),
-                ..footprint
-            }),
-            Err(SurfaceError::Parallel | SurfaceError::LooksAlongTheAxis) => {
-                surface.check_inside(&pose.t_wc)?;
-                Ok(Self {
-                    s_min_m: 0.0,
-                    s_max_m: surface.perimeter_m(),
-                    h_min_m: *near_m.start(),
-                    h_max_m: *near_m.end(),
-                })
-            }
-            Err(error) => Err(error),
+        let straight = surface.straightened(pose);
+        let end_m = |along: f64| h_m + along.signum() * camera.max_range_m;
+        let rays = camera.border(SAMPLES_PER_EDGE, 0.0).into_iter();
+        let border_m = rays
+            .filter_map(|pixel| camera.ray(pixel.x, pixel.y))
+            .map(|ray_c| match sighted_wall(surface, camera, pose, &ray_c) {
+                Ok(hit) => hit.wall.h_m,
+                Err(_) => end_m((straight.r_wc * ray_c).y),
+            });
+        let vanishing_m = [1.0, -1.0].into_iter().filter_map(|along| {
+            let ray_c = straight
+                .r_wc
+                .inverse_transform_vector(&(Vector3::y() * along));
+            let pixel = camera.project(&ray_c)?;
+            camera.is_in_image(&pixel, 0.0).then(|| end_m(along))
+        });
+        let nothing = (f64::INFINITY, f64::NEG_INFINITY);
+        let (h_min_m, h_max_m) = border_m
+            .chain(vanishing_m)
+            .fold(nothing, |(from, to), h_m| (from.min(h_m), to.max(h_m)));
+        Self {
+            s_min_m: 0.0,
+            s_max_m: surface.perimeter_m(),
+            h_min_m,
+            h_max_m,
         }
     }
 
@@ -162,7 +189,6 @@ mod tests {
     use super::*;
     use crate::surface::circle::Circle;
     use crate::trajectory::{so3, spiral};
-    use nalgebra::Vector3;
     use std::f64::consts::TAU;
 
     fn camera() -> Camera {
@@ -219,18 +245,29 @@ mod tests {
     }
 
     #[test]
-    fn a_view_along_the_tunnel_is_cut_off() {
+    fn a_view_along_the_tunnel_ends_at_the_range() {
         let circle = Circle::new(3.0).unwrap();
-        let camera = camera();
+        let near = Camera {
+            max_range_m: 5.0,
+            ..camera()
+        };
+        // Looking along +y; the corners meet the wall at h = r f/hypot(u, v).
         let along = facing(Vector3::x() * (-TAU / 4.0));
-        let cut = Footprint::within(&circle, &camera, &along, 5.0).unwrap();
-        assert_eq!((cut.h_min_m, cut.h_max_m), (-5.0, 5.0));
-        assert_eq!(cut.s_max_m - cut.s_min_m, circle.perimeter_m());
+        let box_m = Footprint::trace(&circle, &near, &along).unwrap();
+        let corner_m = 3.0 * near.fx / near.cx.hypot(near.cy);
+        let narrow = Camera {
+            max_range_m: 20.0,
+            ..near
+        };
+        assert!(
+            (Footprint::trace(&circle, &narrow, &along).unwrap().h_min_m - corner_m).abs() < 1e-9
+        );
+        assert_eq!(box_m.h_max_m, 5.0);
+        assert_eq!(box_m.s_max_m - box_m.s_min_m, circle.perimeter_m());
         let across = facing(Vector3::zeros());
-        let traced = Footprint::trace(&circle, &camera, &across).unwrap();
         assert_eq!(
-            Footprint::within(&circle, &camera, &across, 5.0),
-            Ok(traced)
+            Footprint::trace(&circle, &near, &across),
+            Footprint::trace(&circle, &camera(), &across)
         );
     }
 

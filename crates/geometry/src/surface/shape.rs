@@ -97,12 +97,3 @@ pub(super) fn normals_of_straight(
         normals.extend_from_within(..s_m.len());
     }
 }
-
-/// Distance of the wall along a camera's optical axis, metres.
-///
-/// # Errors
-/// The errors of [`Surface::hit`].
-pub fn viewing_distance(surface: &dyn Surface, pose: &Pose) -> Result<f64, SurfaceError> {
-    let hit = surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()))?;
-    Ok(hit.range)
-}

@@ -5,7 +5,7 @@ use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
 use crate::parameters::shape::{FunctionValue, Shape};
 use crate::points::equations::PointEquations;
-use crate::samples::footprints::{MAX_VIEWING_DISTANCE_RADII, footprint};
+use crate::samples::footprints::footprint;
 use crate::samples::tile_coverage::TileCoverage;
 use crate::samples::visibility::PosedFrame;
 use crate::tiles::grid::{SIDE, WallGrid};
@@ -14,7 +14,7 @@ use std::ops::Range;
 use tunnelstitch_core::frames::FrameError;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-use tunnelstitch_geometry::surface::{Surface, viewing_distance};
+use tunnelstitch_geometry::surface::{Surface, mean_radius_m, viewing_distance};
 
 /// Least number of wall samples over the height of an image. Of whole tiles, a strip of half a tile
 /// with its ring is lost at either border, together a ninth of this height.
@@ -111,22 +111,16 @@ pub fn min_density(rows: u32) -> f64 {
         .max(1.0)
 }
 
-/// Width of a pixel on the wall at the image centre of the median frame, metres. Frames that look
-/// along the tunnel do not count.
+/// Width of a pixel on the wall where the median frame sees it best, metres.
 pub fn pixel_size_on_wall<'p>(
     surface: &dyn Surface,
     camera: &Camera,
     posed: impl Iterator<Item = &'p PosedFrame>,
 ) -> f64 {
     let mut ranges: Vec<f64> = posed
-        .filter_map(|frame| viewing_distance(surface, &frame.pose).ok())
+        .filter_map(|frame| viewing_distance(surface, camera, &frame.pose).ok())
         .collect();
     ranges.sort_unstable_by(f64::total_cmp);
     let median = ranges.get(ranges.len() / 2);
-    let radius_m = surface.perimeter_m() / std::f64::consts::TAU;
-    median
-        .copied()
-        .unwrap_or(radius_m)
-        .min(MAX_VIEWING_DISTANCE_RADII * radius_m)
-        / camera.fy
+    median.copied().unwrap_or_else(|| mean_radius_m(surface)) / camera.fy
 }

@@ -3,7 +3,7 @@
 use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa};
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use crate::problem::photometric_problem::PhotometricProblem;
-use tunnelstitch_geometry::surface::{bend_jacobian, lens_jacobian, wall_jacobian};
+use tunnelstitch_geometry::surface::{bend_jacobian, lens_jacobian, sighted_wall, wall_jacobian};
 
 /// Largest log-gain of a feasible estimate, standard deviations of its prior. No frame has such a
 /// gain; one that fits nowhere could lower its cost by a gain near 0.
@@ -46,8 +46,8 @@ impl PhotometricProblem<'_> {
         let curvature = shared.fixed_rows::<BEND_PARAMETERS>(BEND_INDEX);
         (self.camera.corner_and_centre_rays().into_iter())
             .filter_map(|ray_c| {
-                let ray = pose.r_wc * ray_c;
-                let hit = self.context.surface.hit(&pose.t_wc, &ray).ok()?;
+                let surface = self.context.surface.as_ref();
+                let hit = sighted_wall(surface, &self.camera, pose, &ray_c).ok()?;
                 let wall = self.context.surface.frame(hit.wall);
                 let a = wall_jacobian(pose, &wall);
                 let mut motion = a * xi;

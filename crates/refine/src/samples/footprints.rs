@@ -5,31 +5,16 @@ use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-use tunnelstitch_geometry::surface::{Footprint, Surface};
+use tunnelstitch_geometry::surface::Footprint;
 use tunnelstitch_geometry::trajectory::Pose;
 
-/// Largest distance along the tunnel at which a camera on the axis resolves the wall, radii of a
-/// circle with the section's perimeter.
+/// Distance up to which a camera on the axis resolves the wall, radii of a circle with the section's
+/// perimeter.
 ///
 /// At an angle φ to the section `cos³ φ` of the pixels are left: the share
-/// [`crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA`] at `tan φ = √(0.05^(−2/3) − 1)`.
-pub const RESOLVED_REACH_RADII: f64 = 2.5;
-
-/// Viewing distance of the farthest wall that is resolved, radii: `√(1 + 2.5²)`. The size of pixels
-/// on the wall, and so the lattices for frames that look along the tunnel, are bounded to it.
-pub const MAX_VIEWING_DISTANCE_RADII: f64 = 2.7;
-
-/// Largest distance along the tunnel at which a frame is compared, radii.
-///
-/// If the lattice is laid out for the viewing distance D, a sample at distance d has the relative
-/// area `D² p/d³` in a frame, p the camera's distance from the line of wall. With D = 2.7, the area
-/// falls below 0.05 beyond `√(d² − p²)` = 5.8 for a camera half a radius off the axis, p = 1.5.
-const MAX_REACH_RADII: f64 = 6.0;
-
-/// Largest distance along the tunnel at which a frame is compared, metres.
-pub fn reach_m(surface: &dyn Surface) -> f64 {
-    MAX_REACH_RADII * surface.perimeter_m() / std::f64::consts::TAU
-}
+/// [`crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA`] at `tan φ = √(0.05^(−2/3) − 1)` =
+/// 2.5, where the wall is `1/cos φ` away.
+pub const RESOLVED_RANGE_RADII: f64 = 2.7;
 
 /// Footprint of frame `frame` at `pose`, taken by `camera`.
 ///
@@ -41,13 +26,8 @@ pub fn footprint(
     frame: usize,
     pose: &Pose,
 ) -> Result<Footprint, ProblemError> {
-    Footprint::within(
-        context.surface.as_ref(),
-        camera,
-        pose,
-        reach_m(context.surface.as_ref()),
-    )
-    .map_err(|source| ProblemError::Placement { frame, source })
+    Footprint::trace(context.surface.as_ref(), camera, pose)
+        .map_err(|source| ProblemError::Placement { frame, source })
 }
 
 /// Chainages between which some footprints lie, metres.

@@ -249,7 +249,7 @@ mod tests {
             .map(|pose| PosedFrame {
                 sweep: Sweep::default(),
                 pose: *pose,
-                footprint: Footprint::within(&wall.circle, &camera, pose, 6.0).unwrap(),
+                footprint: Footprint::trace(&wall.circle, &camera, pose).unwrap(),
                 active: true,
             })
             .collect();

@@ -12,7 +12,7 @@ use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::shape;
 use crate::stages::state::{Estimation, GlobalSolve, LastSolve, PipelineState};
-use crate::tracking::shading_correction::correct;
+use crate::tracking::shading_correction::correct_once;
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::validation::inconsistent_frames::reject_disagreeing_frames;
@@ -83,7 +83,7 @@ pub fn run<'a>(
         record: solution.record.clone(),
     });
     if has_solve_ahead(state) && setup.frames.shading().is_some() {
-        correct(&context, setup.options, &state.frames)?;
+        correct_once(&context, setup.options, &state.frames)?;
     }
     // The assessment uses the last one only.
     if let Some(uncertainty) = uncertainty.filter(|_| !has_solve_ahead(state)) {

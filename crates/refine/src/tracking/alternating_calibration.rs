@@ -75,9 +75,12 @@ impl AlternatingCalibration {
             }
             progress.finish();
             let mut states = self.tracking.tracked_states();
-            correct_until_settled(&context.at(states.kappa), options, &mut states)?;
+            let context = context.at(states.kappa);
+            let observed = correct_until_settled(&context, options, &mut states)?;
             let after = context.frames.shading();
-            if after.is_none_or(|after| after.relative_difference(&before) < MAX_SHADING_CHANGE) {
+            let change =
+                after.map_or(0.0, |after| after.relative_difference(&before, observed));
+            if change < MAX_SHADING_CHANGE {
                 break;
             }
         }

@@ -1,10 +1,9 @@
 //! A regular grid on the unrolled wall, on which frames are compared.
 
 use crate::model::context::EstimationContext;
-use crate::samples::footprints::MAX_VIEWING_DISTANCE_RADII;
 use nalgebra::Vector3;
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Footprint, WallPoint, viewing_distance};
+use tunnelstitch_geometry::surface::{Footprint, WallPoint, mean_radius_m, viewing_distance};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// Largest number of grid points, which bounds the memory: a frame that looks far along the tunnel
@@ -67,7 +66,7 @@ impl MosaicGrid {
 
 /// Width of a pixel on the wall where `pose` looks, metres.
 pub fn pixel_size_m(context: &EstimationContext, camera: &Camera, pose: &Pose) -> f64 {
-    let radius_m = context.surface.perimeter_m() / std::f64::consts::TAU;
-    let distance_m = viewing_distance(context.surface.as_ref(), pose).unwrap_or(radius_m);
-    distance_m.min(MAX_VIEWING_DISTANCE_RADII * radius_m) / camera.fy
+    let surface = context.surface.as_ref();
+    let distance_m = viewing_distance(surface, camera, pose);
+    distance_m.unwrap_or_else(|_| mean_radius_m(surface)) / camera.fy
 }

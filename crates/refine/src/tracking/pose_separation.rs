@@ -1,7 +1,7 @@
 //! Distance between two poses of a frame, measured on the wall.
 
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Surface, shortest_arc};
+use tunnelstitch_geometry::surface::{Surface, shortest_arc, sighted_wall};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// Distance on the wall between two poses of a frame, metres: the mean over those of the picture's
@@ -13,7 +13,7 @@ pub fn separation_m(surface: &dyn Surface, camera: &Camera, a: &Pose, b: &Pose) 
     let perimeter = surface.perimeter_m();
     let (mut sum_m, mut count) = (0.0, 0.0);
     for ray_c in camera.corner_and_centre_rays() {
-        let hit = |pose: &Pose| surface.hit(&pose.t_wc, &(pose.r_wc * ray_c)).ok();
+        let hit = |pose: &Pose| sighted_wall(surface, camera, pose, &ray_c).ok();
         if let (Some(a), Some(b)) = (hit(a), hit(b)) {
             let (a, b) = (a.wall, b.wall);
             sum_m += shortest_arc(a.s_m - b.s_m, perimeter).hypot(a.h_m - b.h_m);

@@ -78,8 +78,13 @@ pub fn prescreen(
         }
     }
     progress.finish();
-    // A hundred times the relative brightness: grey levels of an ordinary picture.
-    let mean = sums.iter().map(|[sum, n]| (100.0 * sum / n) as f32);
+    // A hundred times the relative brightness: grey levels of an ordinary picture. Outside the
+    // lens's field of view there is nothing.
+    let camera = context.camera.at_level(coarsest);
+    let mean = sums.iter().enumerate().map(|(k, [sum, n])| {
+        let is_shown = camera.ray((k % size.0) as f64, (k / size.0) as f64).is_some();
+        if is_shown { (100.0 * sum / n) as f32 } else { f32::NAN }
+    });
     let mean = GreyImage::new(size.0, size.1, mean.collect());
     let full = (
         context.camera.width as usize,
@@ -126,7 +131,7 @@ fn rms_difference(a: &GreyImage, b: &GreyImage) -> f64 {
 /// picture by more than a pixel of the coarsest level, where pictures are compared.
 fn has_moved(context: &EstimationContext, a: usize, b: usize, coarsest: usize) -> bool {
     let (from, to) = (&context.prior.initial[a], &context.prior.initial[b]);
-    let Ok(distance_m) = viewing_distance(context.surface.as_ref(), from) else {
+    let Ok(distance_m) = viewing_distance(context.surface.as_ref(), &context.camera, from) else {
         return true;
     };
     let rotation = from.r_wc.angle_to(&to.r_wc);

@@ -3,7 +3,7 @@
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::samples::footprints::RESOLVED_REACH_RADII;
+use crate::samples::footprints::RESOLVED_RANGE_RADII;
 use crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA;
 use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
 use crate::tracking::ncc_score::NccScore;
@@ -11,7 +11,7 @@ use crate::tracking::unwrapped_frame::{UnwrappedFrame, UnwrappedSampler};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Footprint, WallPoint};
+use tunnelstitch_geometry::surface::{Footprint, WallPoint, mean_radius_m};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// The wall around a frame, fused from the registered frames.
@@ -75,14 +75,15 @@ impl ReferenceMosaic {
         (frame, pose): (usize, &Pose),
         margin_m: f64,
     ) -> Result<Self, ProblemError> {
-        let radius_m = context.surface.perimeter_m() / std::f64::consts::TAU;
-        let reach_m = RESOLVED_REACH_RADII * radius_m;
-        let footprint = Footprint::within(context.surface.as_ref(), camera, pose, reach_m)
+        let radius_m = mean_radius_m(context.surface.as_ref());
+        let resolving = Camera {
+            max_range_m: camera.max_range_m.min(RESOLVED_RANGE_RADII * radius_m),
+            ..*camera
+        };
+        let footprint = Footprint::trace(context.surface.as_ref(), &resolving, pose)
             .map_err(|source| ProblemError::Placement { frame, source })?
             .widened(margin_m);
-        // A frame that looks along the tunnel has its detail where the wall is near, for a camera
-        // on the axis a radius away.
-        let spacing_m = pixel_size_m(context, camera, pose).min(radius_m / camera.fy);
+        let spacing_m = pixel_size_m(context, camera, pose);
         let grid = MosaicGrid::over(&footprint, spacing_m);
         let middle = WallPoint {
             s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),

@@ -13,11 +13,13 @@ use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
-use crate::thresholds::correlation_search::{MAX_DEVIATION_SIGMA, PITCH_STEP_RAD};
+use crate::thresholds::correlation_search::MAX_DEVIATION_SIGMA;
 use crate::thresholds::registration::{MAX_HYPOTHESES, MEAN_HYPOTHESES, MIN_UNEXPLAINED};
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::candidate::{Candidate, choose_candidate, sort_candidates, unexplained_share};
-use crate::tracking::correlation_search::{Hypothesis, log_likelihood, search_poses};
+use crate::tracking::correlation_search::{
+    Hypothesis, log_likelihood, search_poses, turn_step_rad,
+};
 use crate::tracking::mosaic_grid::pixel_size_m;
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::PosePrediction;
@@ -49,9 +51,9 @@ const MIN_SCORE_GAIN_NATS: f64 = 3.0;
 /// which the ambiguity test compares.
 const MAX_CLOSER_HYPOTHESES: usize = 2;
 
-/// Largest σ of pitch, yaw and roll in a closer search, radians. The search then covers the pitch
-/// next to that of the best candidate, and the half step around it that shifts make up for.
-const CLOSER_SEARCH_SIGMA_RAD: f64 = 1.5 * PITCH_STEP_RAD / MAX_DEVIATION_SIGMA;
+/// Reach of a closer search, steps of the turns: those next to that of the best candidate, and the
+/// half step around them that shifts make up for.
+const CLOSER_SEARCH_STEPS: f64 = 1.5;
 
 /// Deviation `½ eᵀΣ⁻¹e` of a pose from the prior's prediction up to which the prior allows it: all
 /// six unknowns of the pose as far off as the search reaches.
@@ -102,7 +104,9 @@ pub fn register_frame(
     neighbours: &Neighbours,
     effort: &mut Effort,
 ) -> Result<Result<Registered, RejectionReason>, ProblemError> {
-    let Ok(distance_m) = viewing_distance(context.surface.as_ref(), &predicted.pose) else {
+    let Ok(distance_m) =
+        viewing_distance(context.surface.as_ref(), &context.camera, &predicted.pose)
+    else {
         return Ok(Err(RejectionReason::NoMatch { correlation: 0.0 }));
     };
     let registration =
@@ -245,9 +249,14 @@ impl<'r> Registration<'r> {
         candidates: &mut Vec<Candidate>,
         effort: &mut Effort,
     ) -> Result<(), ProblemError> {
-        let sigma_rad = self
-            .sigma_rad
-            .map(|sigma| sigma.min(CLOSER_SEARCH_SIGMA_RAD));
+        let step_rad = turn_step_rad(
+            self.context,
+            self.unwrapped.camera(),
+            &self.predicted.pose,
+            self.mosaic.grid.spacing_m,
+        );
+        let widest_rad = CLOSER_SEARCH_STEPS * step_rad / MAX_DEVIATION_SIGMA;
+        let sigma_rad = self.sigma_rad.map(|sigma| sigma.min(widest_rad));
         for _ in 0..MAX_TRACKING_ITERATIONS {
             sort_candidates(candidates);
             let first = candidates.first();

@@ -18,6 +18,7 @@ use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::solver::neighbourhood::Neighbourhood;
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
+use nalgebra::Vector2;
 use std::ops::Range;
 use tunnelstitch_core::frames::Shading;
 use tunnelstitch_photometry::{Observation, PhotometricCalibration, Priors};
@@ -33,7 +34,8 @@ const MIN_SIGNIFICANCE_SIGMA: f64 = 3.0;
 /// 55.5/27.
 const MIN_CHANGE_SIGNIFICANCE_SIGMA: f64 = 1.43;
 
-/// Corrects the shading until frames agree where they overlap, solving for their poses in between.
+/// Corrects the shading until frames agree where they overlap, solving for their poses in between;
+/// returns the pixels at which wall was observed last.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -41,56 +43,70 @@ pub fn correct_until_settled(
     context: &EstimationContext,
     options: &RefineOptions,
     frames: &mut FrameStates,
-) -> Result<(), ProblemError> {
+) -> Result<Vec<Vector2<f64>>, ProblemError> {
     let side = context.camera.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
+    let mut pixels = Vec::new();
     for _ in 0..MAX_TRACKING_ITERATIONS {
-        if !correct(context, options, frames)? {
+        let points = observe_tiles(context, options, frames)?;
+        pixels = points.iter().flatten().map(Observation::pixel).collect();
+        if !correct(context, &points, frames.estimates.len()) {
             break;
         }
         Neighbourhood::of_all(frames).solve(context, options, finest..=coarsest, frames)?;
     }
-    Ok(())
+    Ok(pixels)
 }
 
-/// Corrects the shading by what overlapping frames show at their present poses; false if nothing
+/// Corrects the shading by what overlapping frames show at their present poses, if something
 /// significant is wrong with it.
 ///
 /// # Errors
 /// [`ProblemError`].
-pub fn correct(
+pub fn correct_once(
     context: &EstimationContext,
     options: &RefineOptions,
     frames: &FrameStates,
-) -> Result<bool, ProblemError> {
-    let count = frames.estimates.len();
+) -> Result<(), ProblemError> {
+    let points = observe_tiles(context, options, frames)?;
+    correct(context, &points, frames.estimates.len());
+    Ok(())
+}
+
+/// The frames that the shading is estimated from, of `count`: the middle ones.
+fn calibrated_frames(count: usize) -> Range<usize> {
     let first = count.saturating_sub(MAX_SHADING_FRAMES) / 2;
-    let range = first..(first + MAX_SHADING_FRAMES).min(count);
+    first..(first + MAX_SHADING_FRAMES).min(count)
+}
+
+/// Corrects the shading by what overlapping frames of `count` show of wall `points`; false if
+/// nothing significant is wrong with it.
+fn correct(context: &EstimationContext, points: &[Vec<Observation>], count: usize) -> bool {
     let size = (
         context.camera.width as usize,
         context.camera.height as usize,
     );
-    let points = observe_tiles(context, options, frames, &range)?;
     let (before, sigmas) = match context.frames.shading() {
         Some(shading) => ((*shading).clone(), MIN_CHANGE_SIGNIFICANCE_SIGMA),
         None => (Shading::none(size), MIN_SIGNIFICANCE_SIGMA),
     };
-    let found = PhotometricCalibration::solve(&points, range.len(), size, &Priors::default());
+    let frames = calibrated_frames(count).len();
+    let found = PhotometricCalibration::solve(points, frames, &before, &Priors::default());
     let Some(found) = found.filter(|found| found.is_shading_significant(sigmas)) else {
-        return Ok(false);
+        return false;
     };
     context.frames.set_shading(before.changed(&found.shading));
-    Ok(true)
+    true
 }
 
-/// Observes tiles spread over all of the wall by the frames of a range, tile by tile; frames are
-/// counted from the first of the range.
+/// Observes tiles spread over all of the wall by the frames that the shading is estimated from, at
+/// their present poses, tile by tile; frames are counted from the first of these.
 fn observe_tiles(
     context: &EstimationContext,
     options: &RefineOptions,
     frames: &FrameStates,
-    range: &Range<usize>,
 ) -> Result<Vec<Vec<Observation>>, ProblemError> {
+    let range = calibrated_frames(frames.estimates.len());
     let level = options.handover_level(context.camera.shorter_side());
     let window = frames.window_of(range.clone(), range.clone());
     let problem = PhotometricProblem::new(context, Sampling::of(level), window)?;
@@ -122,7 +138,6 @@ fn observe_tiles(
 mod tests {
     use super::*;
     use crate::test_scene::{frame_states, independent_prior, test_context};
-    use nalgebra::Vector2;
     use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
     use tunnelstitch_core::test_wall::{TestWall, waves};
     use tunnelstitch_geometry::trajectory::spiral;
@@ -145,7 +160,8 @@ mod tests {
         let prior = independent_prior(&wall.poses);
         let context = test_context(&wall, &frames, &prior);
         let states = frame_states(&wall.poses);
-        let any = correct(&context, &RefineOptions::default(), &states).unwrap();
+        let points = observe_tiles(&context, &RefineOptions::default(), &states).unwrap();
+        let any = correct(&context, &points, states.estimates.len());
         assert_eq!(any, frames.shading().is_some());
         let shading = frames.shading()?;
         let (w, h) = (f64::from(wall.camera.width), f64::from(wall.camera.height));

@@ -4,7 +4,9 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use nalgebra::Matrix6;
 use serde::{Deserialize, Deserializer};
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Hit, Surface, WallFrame, viewing_distance, wall_jacobian};
+use tunnelstitch_geometry::surface::{
+    Hit, Surface, WallFrame, sighted_wall, viewing_distance, wall_jacobian,
+};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
@@ -104,7 +106,7 @@ fn wall_sigma_m(
 ) -> f64 {
     let (mut sum, mut points) = (0.0, 0.0);
     for ray_c in camera.grid_rays() {
-        let hit = surface.hit(&pose.t_wc, &(pose.r_wc * ray_c)).ok();
+        let hit = sighted_wall(surface, camera, pose, &ray_c).ok();
         if let Some(variance) = hit.and_then(|hit| variance(&hit, &surface.frame(hit.wall))) {
             sum += variance;
             points += 1.0;
@@ -123,9 +125,9 @@ pub fn wall_sigma_px(
     wall_sigma_m(surface, camera, pose, variance) * px_per_metre(surface, camera, pose)
 }
 
-/// Pixels per metre of wall at the middle of a frame.
+/// Pixels per metre of wall where a frame sees it best.
 fn px_per_metre(surface: &dyn Surface, camera: &Camera, pose: &Pose) -> f64 {
-    camera.focal_px() / viewing_distance(surface, pose).unwrap_or(f64::NAN)
+    camera.focal_px() / viewing_distance(surface, camera, pose).unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]

@@ -136,7 +136,8 @@ fn shift_px_per_s(context: &EstimationContext, states: &FrameStates) -> f64 {
     let row_share = 1.0 - 1.0 / f64::from(context.camera.height);
     let shift = |k: usize| {
         let pose = &states.estimates[k].pose;
-        let x_c = Vector3::z() * viewing_distance(context.surface.as_ref(), pose).ok()?;
+        let x_c = Vector3::z()
+            * viewing_distance(context.surface.as_ref(), &context.camera, pose).ok()?;
         let rate = context.sweep_rate(k, &all, &states.estimates);
         let moved = rate.omega_rad.cross(&x_c) + rate.nu_m;
         Some((context.camera.project_jacobian(&x_c) * moved).norm() * row_share)

@@ -64,7 +64,7 @@ pub fn native_px_per_metre<'a>(
     let focal_px = camera.focal_px();
     let mut resolutions = Vec::new();
     for (frame, pose) in poses.into_iter().enumerate() {
-        let distance_m = viewing_distance(surface, pose)
+        let distance_m = viewing_distance(surface, camera, pose)
             .map_err(|source| RenderError::Frame { frame, source })?;
         resolutions.push(focal_px / distance_m);
     }

@@ -75,15 +75,16 @@ impl Exposure {
         let count = placements.len();
         let grid = canvas.coarser((POINTS_PER_FRAME * count).max(MIN_POINTS));
         let size = thumbnails.full_size();
+        let even = Shading::none(size);
         let points = observe_points(surface, thumbnails, placements, &grid);
-        let Some(found) = PhotometricCalibration::solve(&points, count, size, &Priors::default())
+        let Some(found) = PhotometricCalibration::solve(&points, count, &even, &Priors::default())
         else {
             return Self {
                 scale: white / 255.0,
                 ..Self::none(count)
             };
         };
-        let shading = Shading::none(size).changed(&found.shading);
+        let shading = even.changed(&found.shading);
         let brightest = shading.range()[1];
         let mean_log = found.log_gains.iter().sum::<f64>() / count as f64;
         let own = found.log_gains.iter().zip(&found.biases);

@@ -86,5 +86,6 @@ fn camera(line: &str) -> Result<Camera, String> {
         cy: cy - 0.5,
         lens: lens(&params[central..]).map_err(|error| error.what)?,
         sweep: Sweep::default(),
+        max_range_m: f64::INFINITY,
     })
 }

@@ -76,5 +76,6 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
         cy,
         lens,
         sweep: Sweep::default(),
+        max_range_m: f64::INFINITY,
     })
 }

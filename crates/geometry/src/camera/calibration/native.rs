@@ -209,6 +209,7 @@ impl CameraFile {
             cy: self.cy - shift,
             lens,
             sweep: Sweep::default(),
+            max_range_m: f64::INFINITY,
         })
     }
 }

@@ -95,5 +95,6 @@ fn camera(own: &Value, tree: &Value) -> Result<Camera, ParseError> {
         cy: number(own, &["cy"])? - 0.5,
         lens,
         sweep: Sweep::default(),
+        max_range_m: f64::INFINITY,
     })
 }

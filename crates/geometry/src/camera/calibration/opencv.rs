@@ -91,5 +91,6 @@ pub fn read(tree: &Value) -> Result<Camera, ParseError> {
         cy,
         lens,
         sweep: Sweep::default(),
+        max_range_m: f64::INFINITY,
     })
 }

@@ -86,6 +86,7 @@ fn calibrated(lens: Lens) -> Camera {
         cy: 241.0,
         lens,
         sweep: Sweep::default(),
+        max_range_m: f64::INFINITY,
     }
 }
 
