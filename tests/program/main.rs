@@ -20,6 +20,7 @@ mod panorama;
 mod plan;
 mod points;
 mod poses;
+mod real_pictures;
 mod refine;
 mod report;
 mod resume;

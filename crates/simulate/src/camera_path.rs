@@ -40,18 +40,16 @@ impl CameraPath {
         &self.poses
     }
 
-    /// The camera's pose while row `v` of frame `frame` is read.
-    pub fn pose_at_row(&self, frame: usize, v: f64) -> Pose {
-        if self.readout_share == 0.0 {
+    /// The camera's pose while row `v` of frame `frame` is read, after a delay that is given as a
+    /// share of the time between frames.
+    pub fn pose_at_row(&self, frame: usize, v: f64, delay: f64) -> Pose {
+        if self.readout_share == 0.0 && delay == 0.0 {
             return self.poses[frame];
         }
         let last = f64::from(self.rows - 1);
-        let s = self.readout_share * (v / last - 0.5);
-        if s < 0.0 {
-            self.interpolate(frame as i64 - 1, s + 1.0)
-        } else {
-            self.interpolate(frame as i64, s)
-        }
+        let s = self.readout_share * (v / last - 0.5) + delay;
+        let whole = s.floor();
+        self.interpolate(frame as i64 + whole as i64, s - whole)
     }
 
     /// The pose at the share `s` of the interval from pose `k` to the next.
@@ -109,13 +107,16 @@ mod tests {
         for frame in 0..5 {
             for row in [0.0, 30.0, 60.0, 120.0] {
                 let along = frame as f64 + 0.06 * (row / 120.0 - 0.5);
-                let pose = path.pose_at_row(frame, row);
+                let pose = path.pose_at_row(frame, row, 0.0);
                 let turned = Vector3::y() * (turn * along);
                 let expected = Pose::new(
                     nalgebra::UnitQuaternion::from_scaled_axis(turned),
                     Vector3::y() * (0.1 * along),
                 );
                 assert!(distance(&pose, &expected) < 1e-12, "{frame} {row}");
+                // A delay is time, as is the row.
+                let later = path.pose_at_row(frame, 60.0, 0.06 * (row / 120.0 - 0.5));
+                assert!(distance(&later, &pose) < 1e-12, "{frame} {row}");
             }
         }
     }
@@ -138,9 +139,9 @@ mod tests {
         }
         let path = CameraPath::new(poses.clone(), 0.1, 101);
         for k in 1..5 {
-            assert!(distance(&path.pose_at_row(k, 50.0), &poses[k]) < 1e-12);
+            assert!(distance(&path.pose_at_row(k, 50.0, 0.0), &poses[k]) < 1e-12);
             let step = 1e-5;
-            let at = |s: f64| path.pose_at_row(k, 50.0 + 1000.0 * s);
+            let at = |s: f64| path.pose_at_row(k, 50.0 + 1000.0 * s, 0.0);
             let (before, after) = (at(0.0).local(&at(-step)), at(0.0).local(&at(step)));
             assert!((before + after).norm() / step < 1e-3);
             // The tangent of a Catmull–Rom spline.

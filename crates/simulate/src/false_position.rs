@@ -25,7 +25,7 @@ pub(super) fn find_crossing(
     mut inside: RayPoint,
     mut outside: RayPoint,
     point_at: impl Fn(f64, f64) -> RayPoint,
-) -> Vector3<f64> {
+) -> RayPoint {
     let mut wall = outside;
     let mut last = None;
     for _ in 0..MAX_FALSE_POSITION_ITERATIONS {
@@ -45,5 +45,5 @@ pub(super) fn find_crossing(
         last = Some(is_inside);
         *(if is_inside { &mut inside } else { &mut outside }) = wall;
     }
-    wall.point
+    wall
 }

@@ -7,11 +7,18 @@
 //! Every degradation is off by default, has a file of its own, and is applied in this order:
 //!
 //! ```text
-//! wall ─ wet patches ─ cables, lamps ─ moving objects ─ vignetting ─ shaft of the rig ─┐
-//!               ┌───────────────────────────────────────────────────────────────────────┘
-//!               └─ exposure ─┬─> Scene::render_exact
-//!                            └─ fault injection ─ sensor noise and rounding ─> frames
+//! wall ─ wet patches ─ camera lamp, fog ─ cables, lamps ─ interlacing, motion blur ─┐
+//!   ┌────────────────────────────────────────────────────────────────────────────────┘
+//!   └─ moving objects ─ vignetting ─ shaft of the rig ─ defocus ─ dust ─ flicker ─┐
+//!   ┌──────────────────────────────────────────────────────────────────────────────┘
+//!   └─ darkness ─ exposure ─┬─> Scene::render_exact
+//!                           └─ fault injection ─ sensor noise ─ tone curve ─ overlay ─┐
+//!   ┌──────────────────────────────────────────────────────────────────────────────────┘
+//!   └─ rounding ─ JPEG ─> frames
 //! ```
+//!
+//! The first line is a matter of rays; the steps from moving objects to the overlay are the effects
+//! of the folder `effects`.
 //!
 //! Each pixel is the mean of points spread over its square, interpolated between rays that are
 //! intersected with the wall by the simulator's own equations. It shares no warp code with the
@@ -23,38 +30,49 @@
 
 mod as_built;
 mod bad_frames;
+mod camera_lamp;
 mod camera_path;
 mod cross_section;
+mod effects;
 mod error;
-mod exposure;
 mod false_position;
-mod fault_injection;
 mod fittings;
+mod fog;
+mod frame_motion;
+#[cfg(test)]
+mod imaging_tests;
+mod lamp_light;
 mod lining;
-mod moving_objects;
+mod motion_blur;
 mod options;
+mod planned_path;
 mod procedural_noise;
 mod ray_casting;
+mod ray_rows;
 mod rendering;
-mod rig_shaft;
 mod scene;
-mod sensor;
 mod survey_folder;
 mod texture;
 mod tunnel;
-mod vignetting;
+mod unrolled_wall;
 mod visible_wall;
 mod wall_intersection;
+mod wall_light;
 mod wall_raster;
+mod wall_stretches;
+mod wall_view;
 mod wet_patches;
 
 pub use as_built::{AsBuilt, Segments};
 pub use bad_frames::{BadFrames, BadFramesError, FrameFault};
+pub use camera_lamp::CameraLamp;
+pub use effects::effect_options::{FrameEffects, OverlayParts};
+pub use effects::exposure::GainBias;
+pub use effects::flicker::Flicker;
+pub use effects::sensor::BitDepth;
 pub use error::SimulateError;
-pub use exposure::GainBias;
 pub use fittings::fitting_options::Fittings;
 pub use options::{Illumination, SimulateOptions, Wall};
 pub use scene::Scene;
-pub use sensor::BitDepth;
 pub use survey_folder::{SimulationRecord, write_survey};
 pub use texture::slanted_edge::SlantedEdge;

@@ -2,14 +2,19 @@
 
 use crate::as_built::AsBuilt;
 use crate::bad_frames::BadFrames;
+use crate::camera_lamp::CameraLamp;
+use crate::effects::effect_options::FrameEffects;
+use crate::effects::sensor::BitDepth;
 use crate::error::{SimulateError, check_option};
 use crate::fittings::fitting_options::Fittings;
-use crate::sensor::BitDepth;
 use serde::Serialize;
 use std::path::PathBuf;
 use tunnelstitch_core::survey::{PriorSection, TunnelSection};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::trajectory::JitterModel;
+
+/// Angle between optical axis and tunnel axis of a camera that looks at the wall beside it.
+pub(super) const SIDE_VIEW_DEG: f64 = 90.0;
 
 /// Appearance of the wall under even light.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -58,6 +63,10 @@ pub struct SimulateOptions {
     pub advance_m: f64,
     /// Turn about the axis from frame to frame, degrees.
     pub turn_deg: f64,
+    /// Angle between optical axis and tunnel axis, degrees: 90 for the wall beside the camera, 0
+    /// for a view along the tunnel, which ends in fog 60 radii ahead.
+    #[serde(skip_serializing_if = "is_side_view")]
+    pub view_deg: f64,
     /// Time from frame to frame, seconds.
     #[serde(skip_serializing_if = "is_one_second")]
     pub interval_s: f64,
@@ -67,6 +76,10 @@ pub struct SimulateOptions {
     /// the middle row; between them the camera moves smoothly.
     #[serde(skip_serializing_if = "is_default")]
     pub readout_ms: f64,
+    /// Interlaced frames: odd rows, counted from 0, are taken half of the interval between frames
+    /// after the even ones, whose poses are the true ones.
+    #[serde(skip_serializing_if = "is_default")]
+    pub interlaced: bool,
     /// True position minus planned position, metres; the initial poses do not contain it.
     pub offset_m: [f64; 3],
     /// Noise of the true poses about the plan, if any; the initial poses do not contain it.
@@ -81,6 +94,12 @@ pub struct SimulateOptions {
     pub wall: Wall,
     /// Illumination of the wall.
     pub light: Illumination,
+    /// Lamp that is fixed to the camera, if any.
+    #[serde(flatten)]
+    pub camera_lamp: Option<CameraLamp>,
+    /// Light, lens, sensor and files that are not ideal.
+    #[serde(flatten)]
+    pub effects: FrameEffects,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise_grey: f64,
     /// Half the range P of the frames' gains, percent: independent and uniform in `1 ± P/100`.
@@ -124,6 +143,11 @@ fn is_one_second(value: &f64) -> bool {
     *value == 1.0
 }
 
+/// True for the default view, which the record leaves out.
+fn is_side_view(view_deg: &f64) -> bool {
+    *view_deg == SIDE_VIEW_DEG
+}
+
 /// True for a default value, which the record leaves out.
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
@@ -138,12 +162,16 @@ impl SimulateOptions {
             camera: Camera::from_vertical_fov(640, 480, 60f64.to_radians()),
             advance_m: 0.0,
             turn_deg: 30.0,
+            view_deg: SIDE_VIEW_DEG,
             interval_s: 1.0,
             readout_ms: 0.0,
+            interlaced: false,
             offset_m: [0.0; 3],
             jitter: None,
             wall: Wall::Brick,
             light: Illumination::Downward,
+            camera_lamp: None,
+            effects: FrameEffects::default(),
             noise_grey: 2.0,
             as_built: AsBuilt::default(),
             fittings: Fittings::default(),
@@ -238,6 +266,10 @@ impl SimulateOptions {
             "the advance must be no more than 1000 metres a frame, and the turn finite",
         )?;
         check_option(
+            (0.0..=180.0).contains(&self.view_deg),
+            "the angle of the view must lie between 0 and 180 degrees",
+        )?;
+        check_option(
             self.offset_m.iter().all(|v| v.is_finite()),
             "the offset must be finite",
         )?;
@@ -270,6 +302,10 @@ impl SimulateOptions {
         let radius_m = self.tunnel.nominal_m();
         self.as_built.validate(radius_m)?;
         self.fittings.validate()?;
+        self.effects.validate(self.bits)?;
+        if let Some(lamp) = &self.camera_lamp {
+            lamp.validate(radius_m)?;
+        }
         check_option(
             self.noise_grey.is_finite() && self.noise_grey >= 0.0,
             "the noise must not be negative",
@@ -357,6 +393,10 @@ mod tests {
             },
             SimulateOptions {
                 readout_ms: f64::NAN,
+                ..free()
+            },
+            SimulateOptions {
+                view_deg: -1.0,
                 ..free()
             },
             SimulateOptions {

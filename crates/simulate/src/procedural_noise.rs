@@ -56,6 +56,14 @@ pub(super) enum RandomStream {
     Segments,
     /// Places and looks of cables and lamps.
     Fittings,
+    /// Phases of the flicker.
+    Flicker,
+    /// Steps of the exposure.
+    ExposureSteps,
+    /// Specks on the lens.
+    LensDust,
+    /// Directions of motion blur.
+    MotionBlur,
 }
 
 impl RandomStream {

@@ -1,41 +1,45 @@
 //! Rendering of single frames and batches, and of the wall itself.
 
-use crate::fault_injection::inject_fault;
-use crate::moving_objects::draw_moving_objects;
-use crate::ray_casting::cast_rays;
+use crate::effects::darkness::dimming_factor;
+use crate::effects::effect_chain::EffectChain;
+use crate::effects::sensor::quantise;
+use crate::ray_casting::{Scenery, cast_rays};
 use crate::scene::Scene;
-use crate::sensor::digitise;
-use crate::vignetting::Vignetting;
-use crate::wall_raster::{BATCH_POINTS, MAX_TEXELS, WallRaster};
+use crate::wall_raster::{MAX_TEXELS, TexelGrid, WallPaint, WallRaster};
+use crate::wall_stretches::{WallStretch, unite};
+use crate::wall_view::WallRasters;
 use image::DynamicImage;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
-use std::f64::consts::TAU;
 use tunnelstitch_core::frames::GreyImage;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
-/// Number of rows of [`Scene::wall`] that are rendered at a time.
-const STRIP_ROWS: usize = 128;
+/// Maximum points of the texture along each side of a coarse texel.
+const MAX_TEXTURE_POINTS: usize = 3;
+/// Frames whose light decides how much a dark survey is dimmed.
+const MEASURED_FRAMES: usize = 6;
 
 impl Scene {
-    /// Renders a frame without sensor noise, faults, rounding and saturation, in grey levels.
+    /// Renders a frame without faults, sensor noise, tone curve, overlay, rounding and saturation,
+    /// in grey levels.
     ///
-    /// Wet patches and their reflections, cables, lamps, moving objects, vignetting, the rig's
-    /// shaft, gain and bias are included.
+    /// Wet patches and their reflections, cables, lamps, motion blur, moving objects, vignetting,
+    /// the rig's shaft, the lens's faults, flicker, gain and bias are included.
     ///
     /// # Panics
     /// If there is no such frame.
     pub fn render_exact(&self, frame: usize) -> GreyImage {
-        self.exact_frame(&self.wall_raster(self.visible_h_m[frame]), frame)
+        self.exact_frame(&self.rasters(&self.stretches(frame)), frame)
     }
 
     /// Renders all frames that exist like [`Self::render_exact`], with `times` as many pixels along
     /// each axis, from the same raster of the wall.
     pub fn render_finer(&self, times: u32) -> Vec<GreyImage> {
+        let chain = EffectChain::of_light(&self.options, times, self.dimming);
         let frames_of = |batch: FrameBatch| {
-            let raster = self.wall_raster(batch.h_m);
-            let finer = |(_, source): &(usize, usize)| self.render_at(&raster, *source, times);
+            let rasters = self.rasters(&batch.stretches);
+            let finer = |(_, source): &(usize, usize)| {
+                let points = self.options.supersample.div_ceil(times);
+                chain.apply(*source, self.cast_frame(&rasters, *source, times, points))
+            };
             batch.frames.par_map(finer)
         };
         self.batches().into_iter().flat_map(frames_of).collect()
@@ -47,147 +51,162 @@ impl Scene {
     /// If there is no such frame.
     pub fn render(&self, frame: usize) -> Option<DynamicImage> {
         let source = self.options.bad_frames.source_frame(frame)?;
-        let raster = self.wall_raster(self.visible_h_m[source]);
-        Some(self.digitised_frame(&raster, source))
-    }
-
-    /// Renders the unrolled wall under its illumination, without specular reflections,
-    /// cables and lamps.
-    ///
-    /// The result has `rows` rows of `columns` square pixels, once around from θ = 0; the first row
-    /// begins at chainage `h_start_m` (metres). Each pixel is the mean of points spread over its
-    /// square, as many as over a frame's pixel, of the raster that frames are cast from.
-    pub fn wall(&self, columns: usize, rows: usize, h_start_m: f64) -> GreyImage {
-        let n = self.options.supersample as usize;
-        let pixel_m = self.tunnel.perimeter_m() / columns as f64;
-        let share = |k: usize| (k as f64 + 0.5) / n as f64;
-        let mut data = vec![0.0; columns * rows];
-        for (strip, pixels) in data.chunks_mut(columns * STRIP_ROWS).enumerate() {
-            let from_m = h_start_m + (strip * STRIP_ROWS) as f64 * pixel_m;
-            let raster = self.wall_raster([from_m, from_m + STRIP_ROWS as f64 * pixel_m]);
-            let lines = pixels.par_chunks_mut(columns).enumerate();
-            lines.for_each(|(row, line)| {
-                for (down, across) in (0..n * n).map(|k| (k / n, k % n)) {
-                    let h_m = [from_m + (row as f64 + share(down)) * pixel_m; BATCH_POINTS];
-                    for (part, pixels) in line.chunks_mut(BATCH_POINTS).enumerate() {
-                        let column = |k: usize| (part * BATCH_POINTS + k) as f64 + share(across);
-                        let theta: [f64; BATCH_POINTS] =
-                            std::array::from_fn(|k| column(k) * TAU / columns as f64);
-                        let (mut values, count) = ([0.0; BATCH_POINTS], pixels.len());
-                        raster.sample(&theta[..count], &h_m[..count], &mut values);
-                        for (pixel, value) in pixels.iter_mut().zip(&values) {
-                            *pixel += value;
-                        }
-                    }
-                }
-                line.iter_mut().for_each(|pixel| *pixel /= (n * n) as f32);
-            });
-        }
-        GreyImage::new(columns, rows, data)
+        let rasters = self.rasters(&self.stretches(source));
+        Some(self.digitised_frame(&rasters, source))
     }
 
     /// Groups consecutive existing frames, so that the wall of each group fits into bounded memory.
     pub(super) fn batches(&self) -> Vec<FrameBatch> {
+        self.batches_of(0..self.options.frames)
+    }
+
+    /// Groups those of some frames that exist.
+    fn batches_of(&self, frames: impl Iterator<Item = usize>) -> Vec<FrameBatch> {
         let mut batches: Vec<FrameBatch> = Vec::new();
-        for frame in 0..self.options.frames {
+        for frame in frames {
             let Some(source) = self.options.bad_frames.source_frame(frame) else {
                 continue;
             };
-            let visible = self.visible_h_m[source];
-            if let Some(FrameBatch { frames, h_m }) = batches.last_mut() {
-                let joined = [h_m[0].min(visible[0]), h_m[1].max(visible[1])];
-                if WallRaster::row_count(joined, self.texel_m()) * self.columns <= MAX_TEXELS {
+            let own = self.stretches(source);
+            if let Some(FrameBatch { frames, stretches }) = batches.last_mut() {
+                let joined = unite(stretches, &own);
+                if self.texel_count(&joined) <= MAX_TEXELS {
                     frames.push((frame, source));
-                    *h_m = joined;
+                    *stretches = joined;
                     continue;
                 }
             }
             batches.push(FrameBatch {
                 frames: vec![(frame, source)],
-                h_m: visible,
+                stretches: own,
             });
         }
         batches
     }
 
-    /// Paints the lit wall between two chainages, metres.
-    pub(super) fn wall_raster(&self, h_m: [f64; 2]) -> WallRaster {
-        let texture = self.texture.as_ref();
-        WallRaster::paint(
-            texture,
-            self.options.light,
-            self.wet_patches.as_ref(),
-            self.columns,
-            self.texel_m(),
-            h_m,
-        )
+    /// Paints stretches of the lit wall.
+    pub(super) fn rasters(&self, stretches: &[WallStretch]) -> WallRasters {
+        WallRasters::new(stretches, |stretch| self.paint(stretch))
     }
 
-    /// Renders like [`Self::render_exact`], from a raster that holds all the frame sees.
-    fn exact_frame(&self, raster: &WallRaster, frame: usize) -> GreyImage {
-        self.render_at(raster, frame, 1)
-    }
-
-    /// Renders an exact frame with `times` as many pixels along each axis, and correspondingly
-    /// fewer sample points per pixel.
-    fn render_at(&self, raster: &WallRaster, frame: usize, times: u32) -> GreyImage {
-        let options = &self.options;
-        let pose = |v: f64| {
-            self.path
-                .pose_at_row(frame, (v + 0.5) / f64::from(times) - 0.5)
+    /// Paints a stretch of the lit wall.
+    pub(super) fn paint(&self, stretch: &WallStretch) -> WallRaster {
+        let paint = WallPaint {
+            texture: self.texture.as_ref(),
+            light: self.options.light,
+            wet_patches: self.wet_patches.as_ref(),
         };
-        let (camera, points) = (
-            self.camera.upsampled(times),
-            options.supersample.div_ceil(times),
-        );
-        let (tunnel, occluders) = (&self.tunnel, self.occluders(frame));
-        let wall = cast_rays(raster, tunnel, &occluders, &camera, pose, points);
-        let occluded = draw_moving_objects(options.seed, frame, options.moving, wall);
-        let lit = match options.lamp_corner {
-            Some(corner) => {
-                Vignetting::new(corner, occluded.width(), occluded.height()).apply(occluded)
+        WallRaster::paint(&paint, self.texel_grid(stretch), stretch.h_m)
+    }
+
+    /// The texels of a stretch of wall.
+    fn texel_grid(&self, stretch: &WallStretch) -> TexelGrid {
+        let coarseness = stretch.coarseness();
+        let columns = self.columns.div_ceil(coarseness);
+        TexelGrid {
+            columns,
+            texel_m: self.tunnel.perimeter_m() / columns as f64,
+            points: coarseness.min(MAX_TEXTURE_POINTS),
+        }
+    }
+
+    /// Number of texels of stretches of wall.
+    pub(super) fn texel_count(&self, stretches: &[WallStretch]) -> usize {
+        let texels = stretches.iter().map(|stretch| {
+            let grid = self.texel_grid(stretch);
+            grid.columns * WallRaster::row_count(stretch.h_m, grid.texel_m)
+        });
+        texels.sum()
+    }
+
+    /// Renders like [`Self::render_exact`], from rasters that hold all the frame sees.
+    fn exact_frame(&self, rasters: &WallRasters, frame: usize) -> GreyImage {
+        let light = self.cast_frame(rasters, frame, 1, self.options.supersample);
+        self.on_light.apply(frame, light)
+    }
+
+    /// Casts the rays of a frame with `times` as many pixels along each axis and `points` sample
+    /// points along each side of a pixel, shared out between sub-exposures.
+    fn cast_frame(
+        &self,
+        rasters: &WallRasters,
+        frame: usize,
+        times: u32,
+        points: u32,
+    ) -> GreyImage {
+        let camera = self.camera.upsampled(times);
+        let scenery = Scenery {
+            tunnel: &self.tunnel,
+            wall: rasters.view(&self.stretches(frame)),
+            light: self.light(),
+            occluders: self.occluders(frame),
+        };
+        let exposures = self.motion.exposure_times();
+        // No fewer points than two along each side, if there are as many.
+        let shared = f64::from(points) / (exposures.len() as f64).sqrt();
+        let points = (shared.round() as u32).max(points.min(2));
+        let mut images = exposures.iter().map(|time| {
+            let pose = |row: usize, v: f64| {
+                let v = (v + 0.5) / f64::from(times) - 0.5;
+                self.motion.pose(frame, row / times as usize, v, *time)
+            };
+            cast_rays(&scenery, &camera, pose, points)
+        });
+        let first = images.next();
+        let mut sum = first.unwrap_or_else(|| GreyImage::new(0, 0, Vec::new()));
+        for image in images {
+            for (sum, value) in sum.data_mut().iter_mut().zip(image.data()) {
+                *sum += value;
             }
-            None => occluded,
-        };
-        let with_shaft = match self.shaft() {
-            Some(shaft) => shaft.occlude(lit),
-            None => lit,
-        };
-        self.exposure(frame).apply(with_shaft)
+        }
+        if exposures.len() > 1 {
+            let share = 1.0 / exposures.len() as f32;
+            sum.data_mut().iter_mut().for_each(|value| *value *= share);
+        }
+        sum
     }
 
-    /// Renders a frame with its fault, sensor noise and rounding, from a raster that holds all it
+    /// Renders a frame with its fault, sensor noise and rounding, from rasters that hold all it
     /// sees. Each frame has its own random stream of sensor noise.
-    pub(super) fn digitised_frame(&self, raster: &WallRaster, frame: usize) -> DynamicImage {
-        let options = &self.options;
-        let exact = self.exact_frame(raster, frame);
-        let image = match options.bad_frames.fault(frame) {
-            Some(fault) => inject_fault(fault, options.seed, frame, exact),
-            None => exact,
-        };
-        let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
-        rng.set_stream(1 + frame as u64);
-        digitise(&image, options.noise_grey, options.bits, &mut rng)
+    pub(super) fn digitised_frame(&self, rasters: &WallRasters, frame: usize) -> DynamicImage {
+        let exact = self.exact_frame(rasters, frame);
+        quantise(&self.in_camera.apply(frame, exact), self.options.bits)
     }
 
-    /// Size of a texel, metres.
-    fn texel_m(&self) -> f64 {
+    /// Finds the factor that makes the survey dark, by the light of some of its frames.
+    pub(super) fn find_dimming(&self) -> f64 {
+        let stride = self.frames().count().div_ceil(MEASURED_FRAMES);
+        let light_of = |batch: FrameBatch| {
+            let rasters = self.rasters(&batch.stretches);
+            let light = |(_, source): &(usize, usize)| {
+                let light = self.cast_frame(&rasters, *source, 1, 1);
+                self.on_light.apply(*source, light)
+            };
+            batch.frames.par_map(light)
+        };
+        let measured = self.batches_of(self.frames().step_by(stride));
+        let light: Vec<GreyImage> = measured.into_iter().flat_map(light_of).collect();
+        dimming_factor(&light, self.options.effects.gamma.unwrap_or(1.0))
+    }
+
+    /// Size of the finest texels, metres.
+    pub(super) fn texel_m(&self) -> f64 {
         self.tunnel.perimeter_m() / self.columns as f64
     }
 }
 
-/// Frames that are rendered from one raster of the wall.
+/// Frames that are rendered from the same rasters of the wall.
 pub(super) struct FrameBatch {
     /// Each frame with the frame whose image it shows.
     pub frames: Vec<(usize, usize)>,
-    /// Minimum and maximum chainage that they see, metres.
-    pub h_m: [f64; 2],
+    /// Stretches of wall that they see.
+    pub stretches: Vec<WallStretch>,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::exposure::GainBias;
+    use crate::effects::exposure::GainBias;
     use crate::options::{Illumination, SimulateOptions, Wall};
     use tunnelstitch_geometry::camera::Camera;
 
@@ -230,9 +249,12 @@ mod tests {
         let scene = Scene::new(&small()).unwrap();
         let batches = scene.batches();
         assert_eq!(batches.len(), 1);
-        let raster = scene.wall_raster(batches[0].h_m);
+        let rasters = scene.rasters(&batches[0].stretches);
         for frame in [0, 7] {
-            assert_eq!(scene.exact_frame(&raster, frame), scene.render_exact(frame));
+            assert_eq!(
+                scene.exact_frame(&rasters, frame),
+                scene.render_exact(frame)
+            );
         }
     }
 
@@ -255,33 +277,6 @@ mod tests {
         let squares = pixels.map(|(u, v)| (mean(u, v) - frame.at(u, v)).powi(2));
         let rms = (squares.sum::<f32>() / (width * height) as f32).sqrt();
         assert!(rms < 0.05, "{rms}");
-    }
-
-    /// At the centre of a frame on the axis, pixels are squares of the wall.
-    #[test]
-    fn the_wall_agrees_with_the_frames() {
-        let options = SimulateOptions {
-            wall: Wall::Concrete,
-            camera: Camera::from_vertical_fov(161, 121, 60f64.to_radians()),
-            ..SimulateOptions::centred()
-        };
-        let scene = Scene::new(&options).unwrap();
-        let frame = scene.render_exact(0);
-        let columns = (TAU * scene.camera().fy).round() as usize;
-        let pixel_m = TAU * options.tunnel.nominal_m() / columns as f64;
-        // The first pixel's middle lies half a pixel off θ = 0.
-        let wall = scene.wall(columns, 4, -2.0 * pixel_m);
-        for (u, v) in [(0, 1), (2, 2), (3, 0)] {
-            let seen: f32 = (0..2)
-                .flat_map(|k| (0..2).map(move |l| (k, l)))
-                .map(|(k, l)| 0.25 * frame.at(80 + u + k, 58 + v + l))
-                .sum();
-            assert!(
-                (wall.at(u, v) - seen).abs() < 1.0,
-                "{} {seen}",
-                wall.at(u, v)
-            );
-        }
     }
 
     /// The bright side faces θ = 0.

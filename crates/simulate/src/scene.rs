@@ -1,38 +1,55 @@
 //! Simulated survey in memory.
 
-use crate::camera_path::CameraPath;
+use crate::effects::effect_chain::EffectChain;
+use crate::effects::exposure::{Exposures, GainBias};
+use crate::effects::overlay::Overlay;
+use crate::effects::rig_shaft::RigShaft;
 use crate::error::SimulateError;
-use crate::exposure::GainBias;
 use crate::fittings::layout::FittingLayout;
 use crate::fittings::occlusion::Occluders;
+use crate::fog::Fog;
+use crate::frame_motion::FrameMotion;
+use crate::lamp_light::LampLight;
 use crate::lining::segment_joints::JointedWall;
-use crate::options::SimulateOptions;
+use crate::options::{SIDE_VIEW_DEG, SimulateOptions};
+use crate::planned_path::plan;
 use crate::procedural_noise::RandomStream;
-use crate::rig_shaft::RigShaft;
 use crate::texture::open::open_texture;
 use crate::texture::wall_texture::WallTexture;
 use crate::tunnel::Tunnel;
-use crate::visible_wall::{texel_size_m, visible_chainage};
+use crate::visible_wall::{MAX_DISTANCE_RADII, texel_size_m, visible_chainage};
+use crate::wall_light::WallLight;
 use crate::wall_raster::MAX_TEXELS;
+use crate::wall_stretches::{WallStretch, stretches_of_view};
 use crate::wet_patches::WetPatches;
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::trajectory::{Jitter, Pose, spiral};
+use tunnelstitch_geometry::trajectory::{Jitter, Pose};
 
 /// A tunnel and the camera's path through it.
 pub struct Scene {
     pub(super) options: SimulateOptions,
     pub(super) camera: Camera,
     plan: Vec<Pose>,
-    pub(super) path: CameraPath,
+    pub(super) motion: FrameMotion,
     /// Minimum and maximum chainage that each frame sees, metres.
     pub(super) visible_h_m: Vec<[f64; 2]>,
     pub(super) tunnel: Tunnel,
     pub(super) texture: Box<dyn WallTexture>,
     pub(super) wet_patches: Option<WetPatches>,
     fittings: FittingLayout,
+    lamp: Option<LampLight>,
+    fog: Option<Fog>,
+    exposures: Exposures,
+    /// Factor by which the light of a dark survey is dimmed.
+    pub(super) dimming: Option<f64>,
+    /// Effects on the light of the frames.
+    pub(super) on_light: EffectChain,
+    /// Effects of the camera on the exposed frames.
+    pub(super) in_camera: EffectChain,
     /// Number of texels around the section.
     pub(super) columns: usize,
 }
@@ -42,15 +59,11 @@ impl Scene {
     ///
     /// # Errors
     /// [`SimulateError`] for impossible options, an unusable texture, and true poses outside the
-    /// tunnel or with a view along it.
+    /// tunnel or, where the camera is to look at the wall beside it, with a view along it.
     pub fn new(options: &SimulateOptions) -> Result<Self, SimulateError> {
         options.validate()?;
         let camera = options.camera;
-        let plan = spiral(
-            options.frames,
-            options.advance_m,
-            options.turn_deg.to_radians(),
-        );
+        let plan = plan(options);
         let offset = Vector3::from(options.offset_m);
         let mut truth: Vec<Pose> = plan
             .iter()
@@ -65,32 +78,22 @@ impl Scene {
         let [plan, truth] = [plan, truth]
             .map(|poses| -> Vec<Pose> { poses.iter().map(|pose| tunnel.to_world(pose)).collect() });
         let texel_m = texel_size_m(&tunnel, &camera, &truth);
-        let readout_share = 1e-3 * options.readout_ms / options.interval_s;
-        let path = CameraPath::new(truth, readout_share, camera.height);
+        let motion = FrameMotion::new(options, truth, &tunnel);
+        let fog = (options.view_deg != SIDE_VIEW_DEG).then(|| Fog::new(&tunnel));
         let visible_h_m = (0..options.frames)
-            .map(|frame| visible_chainage(frame, &path, &camera, &tunnel))
+            .map(|frame| visible_chainage(frame, &motion, &camera, &tunnel, fog))
             .collect::<Result<Vec<_>, _>>()?;
         let perimeter_m = tunnel.perimeter_m();
-        let widest = visible_h_m
-            .iter()
-            .map(|h_m| h_m[1] - h_m[0])
-            .fold(0.0, f64::max);
-        if perimeter_m / texel_m * widest / texel_m > 4.0 * MAX_TEXELS as f64 {
-            return Err(SimulateError::Option {
-                what: format!(
-                    "a frame would see {perimeter_m:.0} × {widest:.0} m of wall painted in steps \
-                     of {:.1} mm, which is more than memory is for; lower the radius, the field \
-                     of view or the frames' size",
-                    1e3 * texel_m
-                ),
-            });
-        }
+        let lamp = match &options.camera_lamp {
+            Some(lamp) => Some(LampLight::new(lamp, &plan[0], &camera, &tunnel)?),
+            None => None,
+        };
         let texture = open_texture(
             &options.wall,
             RandomStream::WallTexture.seed(options.seed),
             perimeter_m,
         )?;
-        Ok(Self {
+        let mut scene = Self {
             texture: match tunnel.lining().and_then(|lining| lining.segments.clone()) {
                 Some(rings) => Box::new(JointedWall::new(texture, rings)),
                 None => texture,
@@ -100,11 +103,44 @@ impl Scene {
                 .then(|| WetPatches::new(options.seed, options.specular_percent, perimeter_m)),
             columns: (perimeter_m / texel_m).ceil() as usize,
             tunnel,
+            on_light: EffectChain::of_light(options, 1, None),
+            in_camera: EffectChain::of_camera(options),
+            exposures: Exposures::new(options),
+            dimming: None,
+            lamp,
+            fog,
             options: options.clone(),
             camera,
             plan,
-            path,
+            motion,
             visible_h_m,
+        };
+        scene.check_texels()?;
+        if options.effects.dark {
+            scene.dimming = Some(scene.find_dimming());
+            scene.on_light = EffectChain::of_light(options, 1, scene.dimming);
+        }
+        Ok(scene)
+    }
+
+    /// Refuses a view of more wall than memory is for.
+    fn check_texels(&self) -> Result<(), SimulateError> {
+        let most = (0..self.options.frames)
+            .map(|frame| self.texel_count(&self.stretches(frame)))
+            .max();
+        if most.unwrap_or(0) <= 4 * MAX_TEXELS {
+            return Ok(());
+        }
+        let perimeter_m = self.tunnel.perimeter_m();
+        let widest_m = self.visible_h_m.iter().map(|h_m| h_m[1] - h_m[0]);
+        Err(SimulateError::Option {
+            what: format!(
+                "a frame would see {perimeter_m:.0} × {:.0} m of wall painted in steps of {:.1} \
+                 mm, which is more than memory is for; lower the radius, the field of view or the \
+                 frames' size",
+                widest_m.fold(0.0, f64::max),
+                1e3 * self.texel_m()
+            ),
         })
     }
 
@@ -120,7 +156,7 @@ impl Scene {
 
     /// The true poses, at the time of each frame's middle row.
     pub fn truth(&self) -> &[Pose] {
-        self.path.poses()
+        self.motion.poses()
     }
 
     /// Deviation of the lining from the nominal radius at an angle (radians, from twelve o'clock
@@ -134,12 +170,12 @@ impl Scene {
         let t = self.truth()[frame].t_wc;
         let d = x_w - t;
         let occluders = self.occluders(frame);
-        occluders.towards(&t, [d; 4]).grey(t, d).is_some()
+        occluders.towards(&t, [d; 4]).grey(t, d, None).is_some()
     }
 
     /// Gain and bias of a frame.
     pub fn exposure(&self, frame: usize) -> GainBias {
-        GainBias::draw(&self.options, frame)
+        self.exposures.of_frame(frame)
     }
 
     /// The indices of all frames that exist, in order.
@@ -155,14 +191,44 @@ impl Scene {
         self.visible_h_m.iter().fold(none, hull)
     }
 
+    /// The stretches of wall that a frame sees.
+    pub(super) fn stretches(&self, frame: usize) -> Vec<WallStretch> {
+        let seen_h_m = self.visible_h_m[frame];
+        if self.fog.is_none() {
+            return vec![WallStretch::near(seen_h_m)];
+        }
+        let camera_h_m = self.tunnel.chainage_m(&self.truth()[frame].t_wc);
+        stretches_of_view(seen_h_m, camera_h_m, self.tunnel.perimeter_m() / TAU)
+    }
+
     /// The cables and lamps that a frame may show.
     pub(super) fn occluders(&self, frame: usize) -> Occluders {
-        let (camera_m, [from_m, to_m]) = (
+        let (camera_h_m, [from_m, to_m]) = (
             self.tunnel.chainage_m(&self.truth()[frame].t_wc),
             self.visible_h_m[frame],
         );
-        let h_m = [from_m.min(camera_m), to_m.max(camera_m)];
+        // Farther away, they would be thinner than a pixel.
+        let far_m = MAX_DISTANCE_RADII * self.tunnel.perimeter_m() / TAU;
+        let h_m = [
+            from_m.min(camera_h_m).max(camera_h_m - far_m),
+            to_m.max(camera_h_m).min(camera_h_m + far_m),
+        ];
         Occluders::new(self.fittings.solids(&self.tunnel, h_m), self.options.light)
+    }
+
+    /// Light that depends on the camera.
+    pub(super) fn light(&self) -> WallLight<'_> {
+        WallLight {
+            lamp: self.lamp.as_ref(),
+            fog: self.fog,
+        }
+    }
+
+    /// The overlay that is burnt into the frames, if there is one.
+    pub(super) fn overlay(&self) -> Option<Overlay> {
+        let size = [self.camera.width as usize, self.camera.height as usize];
+        let overlay = |parts| Overlay::new(parts, size, self.options.interval_s);
+        self.options.effects.overlay.map(overlay)
     }
 
     /// The shaft of the rig, if it is visible.

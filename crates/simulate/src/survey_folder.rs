@@ -28,9 +28,10 @@ pub struct SimulationRecord {
 
 /// Simulates a survey and writes its folder.
 ///
-/// The folder has `survey.toml`, `camera.json`, `frames/000000.png` …, `baseline.tum` (the plan),
-/// `groundtruth.tum` and `simulation.json`, `mask.png` if the rig's shaft is visible, and
-/// `groundtruth_shape.csv` if the lining deviates from the tunnel.
+/// The folder has `survey.toml`, `camera.json`, `frames/000000.png` … (or `.jpg`), `baseline.tum`
+/// (the plan), `groundtruth.tum` and `simulation.json`, `mask.png` if the rig's shaft is visible,
+/// `overlay.png` if the frames have an overlay, and `groundtruth_shape.csv` if the lining deviates
+/// from the tunnel.
 ///
 /// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier
 /// simulated survey of that name is replaced. The same options give the same bytes, whatever the
@@ -60,7 +61,7 @@ pub fn write_survey(
         WriteError::new(&path, error.source)
     };
     write_text_files(&scene, &simulated, folder.path()).map_err(final_name)?;
-    write_mask(&scene, &folder.path().join(MASK_FILE)).map_err(final_name)?;
+    write_masks(&scene, folder.path()).map_err(final_name)?;
     write_frames(&scene, &folder.path().join("frames"), progress).map_err(final_name)?;
     folder.finish()?;
     Ok(simulated)
@@ -68,6 +69,9 @@ pub fn write_survey(
 
 /// Mask of the pixels that show the wall; only written if the rig's shaft is visible.
 const MASK_FILE: &str = "mask.png";
+
+/// Mask of the pixels that no frame's overlay covers; the survey does not name it.
+const OVERLAY_FILE: &str = "overlay.png";
 
 /// Centreline of a curved tunnel.
 const CENTRELINE_FILE: &str = "centreline.txt";
@@ -79,12 +83,13 @@ const TRUE_SHAPE_FILE: &str = "groundtruth_shape.csv";
 const RECORD_FILE: &str = "simulation.json";
 
 /// Files of a simulated survey.
-const FILES: [&str; 10] = [
+const FILES: [&str; 11] = [
     SURVEY_FILE,
     RECORD_FILE,
     // Written by the command line program.
     "run.toml",
     MASK_FILE,
+    OVERLAY_FILE,
     CENTRELINE_FILE,
     "camera.json",
     "baseline.tum",
@@ -152,7 +157,7 @@ fn write_text_files(
             max_range_m: None,
         },
         frames: FramesSection {
-            images: Some("frames/*.png".to_owned()),
+            images: Some(format!("frames/*.{}", frame_format(options).1)),
             video: None,
             every: None,
             angle_step_deg: None,
@@ -197,12 +202,21 @@ fn write_text_files(
     atomic::write_text(&path("groundtruth.tum"), &trajectory(scene.truth()))
 }
 
-fn write_mask(scene: &Scene, path: &Path) -> Result<(), WriteError> {
-    let Some(shaft) = scene.shaft() else {
-        return Ok(());
-    };
+/// Writes the masks of the rig's shaft and of the overlay, each if it is visible.
+fn write_masks(scene: &Scene, folder: &Path) -> Result<(), WriteError> {
+    if let Some(shaft) = scene.shaft() {
+        write_mask(scene, &shaft.wall_mask(), &folder.join(MASK_FILE))?;
+    }
+    if let Some(overlay) = scene.overlay() {
+        let wall = overlay.wall_mask(scene.frames());
+        write_mask(scene, &wall, &folder.join(OVERLAY_FILE))?;
+    }
+    Ok(())
+}
+
+/// Writes a mask: white where the wall is shown, black elsewhere.
+fn write_mask(scene: &Scene, wall: &[bool], path: &Path) -> Result<(), WriteError> {
     let (width, height) = (scene.camera().width, scene.camera().height);
-    let wall = shaft.wall_mask();
     let mask = GrayImage::from_fn(width, height, |u, v| {
         let shown = wall[v as usize * width as usize + u as usize];
         Luma([if shown { 255 } else { 0 }])
@@ -210,21 +224,30 @@ fn write_mask(scene: &Scene, path: &Path) -> Result<(), WriteError> {
     write_picture(path, &mask.into(), PictureFormat::Png)
 }
 
+/// Format and extension of the frames.
+fn frame_format(options: &SimulateOptions) -> (PictureFormat, &'static str) {
+    match options.effects.jpeg_quality {
+        Some(quality) => (PictureFormat::Jpeg { quality }, "jpg"),
+        None => (PictureFormat::Png, "png"),
+    }
+}
+
 /// Renders and writes all frames that exist, named by their numbers in the plan.
 ///
 /// The frames of a batch are rendered in parallel from one raster of the wall.
 fn write_frames(scene: &Scene, folder: &Path, progress: &dyn Progress) -> Result<(), WriteError> {
     atomic::create_folder(folder)?;
+    let (format, extension) = frame_format(&scene.options);
     progress.start("simulating", scene.frames().count());
     for batch in scene.batches() {
-        let raster = scene.wall_raster(batch.h_m);
+        let rasters = scene.rasters(&batch.stretches);
         batch
             .frames
             .into_par_iter()
             .try_for_each(|(frame, source)| {
-                let image = scene.digitised_frame(&raster, source);
-                let path = folder.join(format!("{frame:06}.png"));
-                write_picture(&path, &image, PictureFormat::Png)?;
+                let image = scene.digitised_frame(&rasters, source);
+                let path = folder.join(format!("{frame:06}.{extension}"));
+                write_picture(&path, &image, format)?;
                 progress.advance(1);
                 Ok(())
             })?;

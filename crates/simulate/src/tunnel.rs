@@ -163,6 +163,32 @@ impl Tunnel {
         }
     }
 
+    /// Unit normal of the wall, towards the inside, at a point of it whose chainage is near `h_m`.
+    ///
+    /// It is the direction in which the relative distance beyond the wall falls fastest, by central
+    /// differences but for a cylinder. At a joint it is that of one of the segments.
+    pub fn inward_normal(&self, point: &Vector3<f64>, h_m: f64) -> Vector3<f64> {
+        let step_m = 1e-5 * self.nearest_m();
+        let gradient = |beyond: &dyn Fn(&Vector3<f64>) -> f64| {
+            Vector3::from_fn(|k, _| {
+                let step = Vector3::ith(k, step_m);
+                beyond(&(point + step)) - beyond(&(point - step))
+            })
+        };
+        let outward = match self {
+            Self::Round(_) => Vector3::new(point.x, 0.0, point.z),
+            Self::AsBuilt(lining) => {
+                let segment_m = lining.step_m(point.x.atan2(point.z), point.y);
+                gradient(&|point| lining.beyond_with_step(segment_m, point))
+            }
+            Self::Shaped { section, line } => gradient(&|point| {
+                let local = Self::section_coordinates(line.as_ref(), point, h_m);
+                section.g(local.x, local.z)
+            }),
+        };
+        -outward.normalize()
+    }
+
     /// Chainage of a point, metres.
     pub fn chainage_m(&self, point: &Vector3<f64>) -> f64 {
         match self {
@@ -180,6 +206,56 @@ impl Tunnel {
                 line: Some(line), ..
             } => line.at(line.chainage_m(point)).velocity.normalize(),
             _ => Vector3::y(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wall_intersection::RayCaster;
+    use tunnelstitch_core::survey::{Shape, TunnelSection};
+
+    /// The normal is perpendicular to the chords to neighbouring points of the wall.
+    #[test]
+    fn normals_are_perpendicular_to_the_wall() {
+        let horseshoe = TunnelSection {
+            shape: Shape::Horseshoe,
+            radius_m: None,
+            width_m: Some(5.0),
+            height_m: Some(4.0),
+            ..TunnelSection::round(1.0)
+        };
+        for (section, ovality_mm) in [
+            (TunnelSection::round(3.0), 0.0),
+            (TunnelSection::round(3.0), 60.0),
+            (horseshoe, 0.0),
+        ] {
+            let options = SimulateOptions {
+                tunnel: section,
+                as_built: AsBuilt {
+                    ovality_mm,
+                    ..AsBuilt::default()
+                },
+                ..SimulateOptions::free()
+            };
+            let tunnel = Tunnel::new(&options).unwrap();
+            let t = Vector3::new(0.3, 0.1, -0.2);
+            let caster = RayCaster::new(&tunnel, t);
+            let point = |angle: f64, rise: f64| {
+                let d = Vector3::new(angle.sin(), rise, angle.cos());
+                t + d * caster.intersect(&d).lambda
+            };
+            for angle in [0.3, 1.2, 3.0, 4.4] {
+                let here = point(angle, 0.2);
+                let normal = tunnel.inward_normal(&here, here.y);
+                assert!((normal.norm() - 1.0).abs() < 1e-12);
+                assert!(normal.dot(&(t - here)) > 0.0);
+                for next in [point(angle + 1e-4, 0.2), point(angle, 0.2001)] {
+                    let chord = (next - here).normalize();
+                    assert!(normal.dot(&chord).abs() < 1e-3, "{angle}: {chord}");
+                }
+            }
         }
     }
 }

@@ -18,6 +18,8 @@ pub(super) struct WallHit {
     pub theta: f64,
     /// Chainage, metres.
     pub h_m: f64,
+    /// Position λ on the ray `t + λ d`.
+    pub lambda: f64,
 }
 
 impl WallHit {
@@ -25,6 +27,7 @@ impl WallHit {
     pub const NONE: Self = Self {
         theta: f64::NAN,
         h_m: f64::NAN,
+        lambda: f64::NAN,
     };
 }
 
@@ -36,9 +39,12 @@ pub(super) struct RayCaster<'a> {
     tunnel: &'a Tunnel,
     /// Camera centre, metres.
     pub t: Vector3<f64>,
-    h_m: f64,
+    /// Chainage of the camera, metres.
+    pub h_m: f64,
     /// Unit direction of the axis at the camera.
     along: Vector3<f64>,
+    /// Maximum distance of the wall from the camera along the tunnel, if limited, metres.
+    reach_m: Option<f64>,
 }
 
 impl<'a> RayCaster<'a> {
@@ -49,16 +55,39 @@ impl<'a> RayCaster<'a> {
             h_m: tunnel.chainage_m(&t),
             along: tunnel.direction_at(&t),
             t,
+            reach_m: None,
         }
+    }
+
+    /// Limits the wall to a distance from the camera along the tunnel, metres: rays that meet it
+    /// farther away or nowhere end at that distance.
+    pub fn with_reach(self, reach_m: Option<f64>) -> Self {
+        Self { reach_m, ..self }
     }
 
     /// Intersects a ray of direction `d` with the wall; NaN if it meets none.
     #[inline]
     pub fn intersect(&self, d: &Vector3<f64>) -> WallHit {
-        match self.tunnel {
+        let hit = match self.tunnel {
             Tunnel::Round(radius_m) => self.intersect_round(*radius_m, d),
             Tunnel::AsBuilt(lining) => self.march_to_lining(lining, d),
             Tunnel::Shaped { section, line } => self.march_to_section(section, line.as_ref(), d),
+        };
+        match self.reach_m {
+            Some(reach_m) => self.limit(hit, d, reach_m),
+            None => hit,
+        }
+    }
+
+    /// Moves a hit beyond `reach_m`, metres, or without a wall to that distance.
+    fn limit(&self, hit: WallHit, d: &Vector3<f64>, reach_m: f64) -> WallHit {
+        if (hit.h_m - self.h_m).abs() <= reach_m {
+            return hit;
+        }
+        WallHit {
+            theta: if hit.theta.is_nan() { 0.0 } else { hit.theta },
+            h_m: self.h_m + reach_m.copysign(self.along.dot(d)),
+            lambda: reach_m / d.norm(),
         }
     }
 
@@ -77,12 +106,14 @@ impl<'a> RayCaster<'a> {
         WallHit {
             theta: if theta < 0.0 { theta + TAU } else { theta },
             h_m: self.t.y + way / across * d.y,
+            lambda: way / across,
         }
     }
 
     /// Marches a ray to a lining as built.
     fn march_to_lining(&self, lining: &Lining, d: &Vector3<f64>) -> WallHit {
-        let d = d.normalize();
+        let length = d.norm();
+        let d = d / length;
         let point_at = |distance_m: f64, _: f64| {
             let point = self.t + d * distance_m;
             RayPoint {
@@ -102,9 +133,13 @@ impl<'a> RayCaster<'a> {
                 }
             },
         };
+        let RayPoint {
+            point, distance_m, ..
+        } = wall;
         WallHit {
-            theta: wall.x.atan2(wall.z).rem_euclid(TAU),
-            h_m: wall.y,
+            theta: point.x.atan2(point.z).rem_euclid(TAU),
+            h_m: point.y,
+            lambda: distance_m / length,
         }
     }
 
@@ -119,7 +154,7 @@ impl<'a> RayCaster<'a> {
         d: &Vector3<f64>,
         [mut from_m, last_m]: [f64; 2],
         joints_m: &[f64],
-    ) -> Vector3<f64> {
+    ) -> RayPoint {
         for to_m in joints_m.iter().copied().chain([last_m]) {
             let middle = self.t + d * (0.5 * (from_m + to_m));
             let step_m = lining.step_m(middle.x.atan2(middle.z), middle.y);
@@ -133,14 +168,18 @@ impl<'a> RayCaster<'a> {
             };
             let [from, to] = [from_m, to_m].map(|distance_m| point_at(distance_m, 0.0));
             if from.beyond >= 0.0 {
-                return from.point;
+                return from;
             }
             if to.beyond >= 0.0 {
                 return find_crossing(from, to, point_at);
             }
             from_m = to_m;
         }
-        self.t + d * last_m
+        RayPoint {
+            distance_m: last_m,
+            point: self.t + d * last_m,
+            beyond: 0.0,
+        }
     }
 
     /// Marches a ray to the wall of a section swept along a line.
@@ -150,7 +189,8 @@ impl<'a> RayCaster<'a> {
         line: Option<&Centreline>,
         d: &Vector3<f64>,
     ) -> WallHit {
-        let d = d.normalize();
+        let length = d.norm();
+        let d = d / length;
         let point_at = |distance_m: f64, near_h_m: f64| {
             let point = Tunnel::section_coordinates(line, &(self.t + d * distance_m), near_h_m);
             let beyond = section.g(point.x, point.z) - 1.0;
@@ -165,8 +205,9 @@ impl<'a> RayCaster<'a> {
         };
         let wall = find_crossing(inside, outside, point_at);
         WallHit {
-            theta: section.angle_of(wall.x, wall.z),
-            h_m: wall.y,
+            theta: section.angle_of(wall.point.x, wall.point.z),
+            h_m: wall.point.y,
+            lambda: wall.distance_m / length,
         }
     }
 
@@ -181,7 +222,8 @@ impl<'a> RayCaster<'a> {
         let mut inside = point_at(0.0, self.h_m);
         // Chainage grows from step to step about as it did before.
         let mut growth_m = step_m * self.along.dot(d);
-        for _ in 0..MAX_RAY_STEPS {
+        let steps = |reach_m: f64| (reach_m / step_m) as usize + 1;
+        for _ in 0..self.reach_m.map_or(MAX_RAY_STEPS, steps) {
             let next = point_at(inside.distance_m + step_m, inside.point.y + growth_m);
             if next.beyond >= 0.0 {
                 return Some([inside, next]);
@@ -254,7 +296,7 @@ mod tests {
         let t = Vector3::new(0.4, 0.2, -0.6);
         let caster = RayCaster::new(&tunnel, t);
         for d in directions() {
-            let WallHit { theta, h_m } = caster.intersect(&d);
+            let WallHit { theta, h_m, .. } = caster.intersect(&d);
             let step_m = 1e-4;
             let first = (10_000..).map(|k| t + d * (f64::from(k) * step_m));
             let first = first.into_iter().find(|point| lining.beyond(point) >= 0.0);
@@ -265,6 +307,44 @@ mod tests {
                 "{d}"
             );
         }
+    }
+
+    /// The point at λ lies on the wall at its angle and chainage, for rays of any length.
+    #[test]
+    fn lambda_is_the_position_on_the_ray() {
+        // The sides of segments lie between their radii.
+        for (tunnel, tolerance) in [(segmented(3.0), 1e-2), (Tunnel::Round(3.0), 1e-9)] {
+            let t = Vector3::new(0.4, 0.2, -0.6);
+            let caster = RayCaster::new(&tunnel, t);
+            for d in directions().map(|d| 2.5 * d) {
+                let hit = caster.intersect(&d);
+                let point = t + d * hit.lambda;
+                assert!((point.y - hit.h_m).abs() < 1e-9);
+                assert!((point.x.atan2(point.z) - hit.theta).sin().abs() < 1e-9);
+                assert!((tunnel.radial_position(&point).0 - 1.0).abs() < tolerance);
+            }
+        }
+    }
+
+    #[test]
+    fn with_a_reach_every_ray_ends() {
+        for tunnel in [segmented(3.0), Tunnel::Round(3.0)] {
+            let caster = RayCaster::new(&tunnel, Vector3::new(0.4, 0.2, -0.6));
+            let near = directions().map(|d| caster.intersect(&d).h_m);
+            let caster = caster_with_reach(&tunnel);
+            for (d, h_m) in directions().zip(near) {
+                assert_eq!(caster.intersect(&d).h_m, h_m);
+            }
+            for d in [Vector3::y(), -Vector3::y(), Vector3::new(1e-3, -1.0, 0.0)] {
+                let hit = caster.intersect(&d);
+                assert_eq!(hit.h_m, 0.2 + 90.0 * d.y);
+                assert!(hit.theta.is_finite() && hit.lambda.is_finite());
+            }
+        }
+    }
+
+    fn caster_with_reach(tunnel: &Tunnel) -> RayCaster<'_> {
+        RayCaster::new(tunnel, Vector3::new(0.4, 0.2, -0.6)).with_reach(Some(90.0))
     }
 
     #[test]

@@ -12,6 +12,28 @@ pub(super) const MAX_TEXELS: usize = 1 << 26;
 /// Number of points that are sampled at a time.
 pub(super) const BATCH_POINTS: usize = 64;
 
+/// Appearance of the wall.
+#[derive(Clone, Copy)]
+pub(super) struct WallPaint<'a> {
+    /// Texture under even light.
+    pub texture: &'a dyn WallTexture,
+    /// Illumination.
+    pub light: Illumination,
+    /// Wet patches, if there are any.
+    pub wet_patches: Option<&'a WetPatches>,
+}
+
+/// Texels of a raster.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TexelGrid {
+    /// Number of texels once around.
+    pub columns: usize,
+    /// Size of a texel, metres.
+    pub texel_m: f64,
+    /// Points of the texture along each side of a texel, which is their mean.
+    pub points: usize,
+}
+
 /// Lit grey levels of the wall between two chainages, once around.
 ///
 /// Texel `(k, n)` is centred at `s = (k + ½) texel`, `h = (n + ½) texel` for n from `first_row`, so
@@ -29,28 +51,39 @@ pub(super) struct WallRaster {
 
 impl WallRaster {
     /// Paints the wall from chainage `h_m[0]` to `h_m[1]`, metres, in parallel.
-    pub fn paint(
-        texture: &dyn WallTexture,
-        light: Illumination,
-        wet_patches: Option<&WetPatches>,
-        columns: usize,
-        texel_m: f64,
-        h_m: [f64; 2],
-    ) -> Self {
+    pub fn paint(paint: &WallPaint, grid: TexelGrid, h_m: [f64; 2]) -> Self {
+        let TexelGrid {
+            columns,
+            texel_m,
+            points,
+        } = grid;
         // One more row on either side for the interpolation.
         let first_row = (h_m[0] / texel_m).floor() as i64 - 1;
         let rows = Self::row_count(h_m, texel_m);
         let mut texels = vec![0.0; rows * (columns + 1)];
         let shade: Vec<f32> = (0..columns)
-            .map(|k| light.shade(TAU * (k as f64 + 0.5) / columns as f64))
+            .map(|k| paint.light.shade(TAU * (k as f64 + 0.5) / columns as f64))
             .collect();
         texels
             .par_chunks_exact_mut(columns + 1)
             .enumerate()
             .for_each(|(k, row)| {
-                let h_m = ((first_row + k as i64) as f64 + 0.5) * texel_m;
                 let (once, again) = row.split_at_mut(columns);
-                texture.fill_row(h_m, texel_m, once);
+                let h_m = |part: f64| ((first_row + k as i64) as f64 + part) * texel_m;
+                if points == 1 {
+                    paint.texture.fill_row(h_m(0.5), texel_m, once);
+                } else {
+                    let mut finer = vec![0.0; points * columns];
+                    for j in 0..points {
+                        let h_m = h_m((j as f64 + 0.5) / points as f64);
+                        finer.fill(0.0);
+                        let texel_m = texel_m / points as f64;
+                        paint.texture.fill_row(h_m, texel_m, &mut finer);
+                        for (texel, parts) in once.iter_mut().zip(finer.chunks_exact(points)) {
+                            *texel += parts.iter().sum::<f32>() / (points * points) as f32;
+                        }
+                    }
+                }
                 for (texel, shade) in once.iter_mut().zip(&shade) {
                     *texel *= shade;
                 }
@@ -64,7 +97,7 @@ impl WallRaster {
             texels,
             water: Vec::new(),
         };
-        if let Some(wet_patches) = wet_patches {
+        if let Some(wet_patches) = paint.wet_patches {
             raster.add_wet_patches(wet_patches);
         }
         raster
@@ -144,7 +177,7 @@ impl WallRaster {
             let x = if x < 0.0 { x + columns } else { x };
             let y = h_m / texel_m - 0.5 - first_row;
             column[k] = (x as i32).min(last);
-            row[k] = (y as i32).min(last_row);
+            row[k] = (y as i32).clamp(0, last_row);
             fx[k] = (x - f64::from(column[k])) as f32;
             fy[k] = (y - f64::from(row[k])) as f32;
         }
@@ -196,18 +229,45 @@ mod tests {
         }
     }
 
+    fn ramp() -> WallPaint<'static> {
+        WallPaint {
+            texture: &Ramp,
+            light: Illumination::Even,
+            wet_patches: None,
+        }
+    }
+
+    fn grid(columns: usize, texel_m: f64, points: usize) -> TexelGrid {
+        TexelGrid {
+            columns,
+            texel_m,
+            points,
+        }
+    }
+
+    /// A coarse texel is the mean of the fine ones in it.
+    #[test]
+    fn coarse_texels_are_means() {
+        let texel_m = TAU * 3.0 / 720.0;
+        let fine = WallRaster::paint(&ramp(), grid(720, texel_m, 1), [0.0, 2.0]);
+        let coarse = WallRaster::paint(&ramp(), grid(180, 4.0 * texel_m, 4), [0.0, 2.0]);
+        let texel = |raster: &WallRaster, k: usize, n: i64| {
+            raster.texels[(n - raster.first_row) as usize * (raster.columns + 1) + k]
+        };
+        for k in [0, 50, 179] {
+            for n in 0..10 {
+                let own = (0..16).map(|j| texel(&fine, 4 * k + j % 4, 4 * n + j as i64 / 4));
+                let mean = own.sum::<f32>() / 16.0;
+                assert!((texel(&coarse, k, n) - mean).abs() < 1e-3);
+            }
+        }
+    }
+
     #[test]
     fn a_raster_shows_the_wall_across_the_wrap_and_up_to_its_ends() {
         let (columns, radius_m) = (720, 3.0);
         let texel_m = TAU * radius_m / columns as f64;
-        let raster = WallRaster::paint(
-            &Ramp,
-            Illumination::Even,
-            None,
-            columns,
-            texel_m,
-            [-1.0, 2.0],
-        );
+        let raster = WallRaster::paint(&ramp(), grid(columns, texel_m, 1), [-1.0, 2.0]);
         for theta in [0.0, 0.001, 1.0, 3.1, TAU - 0.001] {
             for h_m in [-1.0, 0.0, 0.777, 2.0] {
                 let expected = 100.0 + 40.0 * theta.cos() + 7.0 * h_m;

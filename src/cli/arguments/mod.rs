@@ -12,10 +12,12 @@
 //! | [`textures`] | textures and layers of the viewer |
 //! | [`as_built`] | deviation of a simulated wall from its drawing, cables and lamps |
 //! | [`simulation`] | degradations of a simulated survey, its wall and its jitter |
+//! | [`imaging`] | lamp, lens, sensor and files of a simulated survey |
 //! | [`resume`] | continuing an interrupted run |
 
 mod as_built;
 mod frame_times;
+mod imaging;
 mod motion;
 mod numbers;
 mod panorama_files;
@@ -28,8 +30,9 @@ mod tunnel;
 
 pub use as_built::AsBuiltArguments;
 pub use frame_times::{FrameTimesArguments, clock_times};
+pub use imaging::ImagingArguments;
 pub use motion::{MotionArguments, MountingArguments};
-pub use numbers::{memory_size, numbers, picture_size, positive, rate, share};
+pub use numbers::{memory_size, numbers, picture_size, positive, rate, share, view_angle};
 pub use panorama_files::OutputArguments;
 pub use poses::{PoseReadingArguments, PosesArguments};
 pub use rendering::{BlendArguments, CanvasArguments, InterpolationArgument, PictureArguments};

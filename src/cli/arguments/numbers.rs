@@ -77,3 +77,17 @@ pub fn memory_size(text: &str) -> Result<u64, String> {
         _ => Err(FORM.to_owned()),
     }
 }
+
+/// Parses the angle between a camera's optical axis and the tunnel's, degrees: "side" (90),
+/// "forward" (0) or a number.
+///
+/// # Errors
+/// Anything else.
+pub fn view_angle(text: &str) -> Result<f64, String> {
+    match (text, text.parse::<f64>()) {
+        ("side", _) => Ok(90.0),
+        ("forward", _) => Ok(0.0),
+        (_, Ok(degrees)) if (0.0..=180.0).contains(&degrees) => Ok(degrees),
+        _ => Err("must be side, forward, or an angle of 0 to 180 degrees".to_owned()),
+    }
+}

@@ -2,8 +2,8 @@
 
 use crate::camera::{Camera, Lens, read_calibration};
 use crate::cli::arguments::{
-    AsBuiltArguments, DegradationArguments, JitterArgument, TunnelArguments, WallArgument, numbers,
-    picture_size, positive,
+    AsBuiltArguments, DegradationArguments, ImagingArguments, JitterArgument, TunnelArguments,
+    WallArgument, numbers, picture_size, positive, view_angle,
 };
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::simulate::{self, Illumination, SimulateOptions, Wall};
@@ -16,7 +16,7 @@ use std::path::PathBuf;
 ///
 /// Writes a folder that all other commands accept: survey.toml, camera.json, frames, baseline.tum
 /// (the planned poses), groundtruth.tum, and simulation.json, which records the options. A lining
-/// that is not as drawn has groundtruth_shape.csv: its true deviation.
+/// that is not as drawn has groundtruth_shape.csv: its true deviation. An overlay has overlay.png.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
@@ -31,6 +31,9 @@ use std::path::PathBuf;
     tunnelstitch simulate free --segments 6 --ring-length-m 1.5 --step-mm 3 --cables 4 --lamps 2 \
     --out built\n  \
     tunnelstitch simulate free --interval-s 0.333 --readout-ms 20 --out rolling\n  \
+    tunnelstitch simulate free --lamp-offset-m 0.1,0,0 --sheen-percent 20 --overlay both \
+    --gamma 2.2 --motion-blur-px 3 --jpeg-quality 80 --out real\n  \
+    tunnelstitch simulate free --view forward --lamp-offset-m 0,0,0 --out forward\n  \
     tunnelstitch simulate free --turns 2 --moving 8 --bad-frames 5:black,18-20:missing --out bad"
 )]
 pub struct SimulateArguments {
@@ -52,14 +55,14 @@ pub struct SimulateArguments {
     /// Advance along the axis per frame, metres [default: 0; free: 0.1].
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     advance_m: Option<f64>,
-    /// Turn about the axis per frame, degrees.
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 30.0,
-        allow_hyphen_values = true
-    )]
-    turn_deg: f64,
+    /// Turn about the axis per frame, degrees [default: 30; with --view forward: 0].
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    turn_deg: Option<f64>,
+    /// Angle between the optical axis and the axis of the tunnel: side (90 degrees), forward (0),
+    /// or degrees from 0 to 180. Unless it is side, the wall fades into dark fog from 30 to 60
+    /// radii away; a view along the axis is drawn up to there.
+    #[arg(long, value_name = "side|forward|DEG", default_value = "side", value_parser = view_angle)]
+    view: f64,
     /// Time between frames, seconds.
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = positive)]
     interval_s: f64,
@@ -136,6 +139,8 @@ pub struct SimulateArguments {
     as_built: AsBuiltArguments,
     #[command(flatten)]
     degradations: DegradationArguments,
+    #[command(flatten)]
+    imaging: ImagingArguments,
     /// Seed of everything random (wall, jitter, noise, degradations): the same seed gives the same
     /// bytes.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -179,7 +184,7 @@ impl SimulateArguments {
         };
         let frames = match (self.frames, self.turns) {
             (Some(frames), _) => frames as usize,
-            (None, Some(turns)) => (turns * 360.0 / self.turn_deg.abs()).round() as usize,
+            (None, Some(turns)) => (turns * 360.0 / self.turn_deg().abs()).round() as usize,
             (None, None) => preset.frames,
         };
         let wall = match (&self.texture, self.wall) {
@@ -196,7 +201,8 @@ impl SimulateArguments {
         let options = SimulateOptions {
             frames,
             advance_m: self.advance_m.unwrap_or(preset.advance_m),
-            turn_deg: self.turn_deg,
+            turn_deg: self.turn_deg(),
+            view_deg: self.view,
             interval_s: self.interval_s,
             readout_ms: self.readout_ms,
             tunnel: self.tunnel.section(),
@@ -212,7 +218,14 @@ impl SimulateArguments {
             seed: self.seed,
             ..preset
         };
-        Ok(self.degradations.add_to(self.as_built.add_to(options)))
+        let options = self.degradations.add_to(self.as_built.add_to(options));
+        Ok(self.imaging.add_to(options))
+    }
+
+    /// Turn from frame to frame, degrees; a camera that looks forward does not revolve by default.
+    fn turn_deg(&self) -> f64 {
+        let default = if self.view == 0.0 { 0.0 } else { 30.0 };
+        self.turn_deg.unwrap_or(default)
     }
 
     /// The camera of --camera, or a pinhole camera with radial distortion.
@@ -267,7 +280,7 @@ pub fn run(
     record: &RunRecord,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    if arguments.turns.is_some() && arguments.turn_deg == 0.0 {
+    if arguments.turns.is_some() && arguments.turn_deg() == 0.0 {
         return Err(Failure::usage(
             "--turns needs a --turn-deg other than 0; or give a number of --frames",
         ));

@@ -1,7 +1,9 @@
 //! Sensor model: noise, saturation and quantisation.
 
+use crate::effects::frame_effect::FrameEffect;
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma};
-use rand::Rng;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use serde::Serialize;
 use tunnelstitch_core::frames::GreyImage;
@@ -28,27 +30,39 @@ impl From<BitDepth> for u8 {
     }
 }
 
-/// Adds white noise of 1-σ `noise_grey` (grey levels), saturates, and rounds to the bit depth.
-pub(super) fn digitise(
-    exact: &GreyImage,
-    noise_grey: f64,
-    bits: BitDepth,
-    rng: &mut impl Rng,
-) -> DynamicImage {
-    let (width, height) = (exact.width() as u32, exact.height() as u32);
-    // The noise is finite and not negative, as the options are validated.
-    let noise = Normal::new(0.0, noise_grey as f32).ok();
-    let mut noisy = |u: u32, v: u32| {
-        let noise = noise.map_or(0.0, |noise| noise.sample(rng));
-        exact.at(u as usize, v as usize) + noise
-    };
+/// White noise of the sensor, with a random stream of its own in each frame.
+pub(super) struct SensorNoise {
+    /// 1-σ, grey levels.
+    pub sigma_grey: f64,
+    /// Seed of the survey.
+    pub seed: u64,
+}
+
+impl FrameEffect for SensorNoise {
+    fn apply(&self, frame: usize, mut image: GreyImage) -> GreyImage {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(1 + frame as u64);
+        // The noise is finite and not negative, as the options are validated.
+        if let Ok(noise) = Normal::new(0.0, self.sigma_grey as f32) {
+            for value in image.data_mut() {
+                *value += noise.sample(&mut rng);
+            }
+        }
+        image
+    }
+}
+
+/// Saturates an image and rounds it to the bit depth.
+pub(crate) fn quantise(image: &GreyImage, bits: BitDepth) -> DynamicImage {
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    let grey = |u: u32, v: u32| image.at(u as usize, v as usize);
     // The casts saturate.
     match bits {
         BitDepth::Eight => {
-            GrayImage::from_fn(width, height, |u, v| Luma([noisy(u, v).round() as u8])).into()
+            GrayImage::from_fn(width, height, |u, v| Luma([grey(u, v).round() as u8])).into()
         }
         BitDepth::Sixteen => ImageBuffer::from_fn(width, height, |u, v| {
-            Luma([(257.0 * noisy(u, v)).round() as u16])
+            Luma([(257.0 * grey(u, v)).round() as u16])
         })
         .into(),
     }
@@ -57,12 +71,14 @@ pub(super) fn digitise(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
 
-    fn digitised(bits: BitDepth, noise_grey: f64) -> DynamicImage {
+    fn digitised(bits: BitDepth, sigma_grey: f64) -> DynamicImage {
         let exact = GreyImage::new(3, 2, vec![-7.0, 0.4, 77.25, 100.5, 254.9, 300.0]);
-        digitise(&exact, noise_grey, bits, &mut ChaCha8Rng::seed_from_u64(1))
+        let noise = SensorNoise {
+            sigma_grey,
+            seed: 1,
+        };
+        quantise(&noise.apply(0, exact), bits)
     }
 
     #[test]

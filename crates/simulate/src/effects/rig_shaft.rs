@@ -1,5 +1,6 @@
 //! Shaft of the camera rig: an occluder at the same pixels of every frame.
 
+use crate::effects::frame_effect::FrameEffect;
 use std::f64::consts::TAU;
 use tunnelstitch_core::frames::GreyImage;
 
@@ -14,7 +15,7 @@ const TONES: [f32; 2] = [18.0, 30.0];
 const RINGS: (f32, f64) = (14.0, 0.45);
 
 /// Dark round bar with rings that occludes the wall at the same pixels of every frame.
-pub(super) struct RigShaft {
+pub(crate) struct RigShaft {
     width: usize,
     height: usize,
     /// Half the width of the shaft, pixels.
@@ -46,10 +47,11 @@ impl RigShaft {
             .map(|k| self.across(k % self.width, k / self.width).is_none())
             .collect()
     }
+}
 
-    /// Draws the shaft over a frame.
-    pub fn occlude(&self, mut frame: GreyImage) -> GreyImage {
-        for (k, value) in frame.data_mut().iter_mut().enumerate() {
+impl FrameEffect for RigShaft {
+    fn apply(&self, _frame: usize, mut image: GreyImage) -> GreyImage {
+        for (k, value) in image.data_mut().iter_mut().enumerate() {
             let (u, v) = (k % self.width, k / self.width);
             if let Some(across) = self.across(u, v) {
                 let round = (1.0 - across * across).sqrt() as f32;
@@ -57,7 +59,7 @@ impl RigShaft {
                 *value = TONES[0] + TONES[1] * round + RINGS.0 * ring.max(0.0);
             }
         }
-        frame
+        image
     }
 }
 
@@ -69,7 +71,7 @@ mod tests {
     fn the_mask_is_what_the_shaft_hides() {
         let shaft = RigShaft::new(12.0, 160, 120);
         let wall = shaft.wall_mask();
-        let frame = shaft.occlude(GreyImage::new(160, 120, vec![150.0; 160 * 120]));
+        let frame = shaft.apply(0, GreyImage::new(160, 120, vec![150.0; 160 * 120]));
         let hidden = wall.iter().filter(|wall| !**wall).count() as f64 / wall.len() as f64;
         assert!((hidden - 0.12 * 0.75).abs() < 0.01, "{hidden}");
         for (value, wall) in frame.data().iter().zip(&wall) {

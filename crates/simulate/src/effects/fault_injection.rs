@@ -1,6 +1,7 @@
 //! Fault injection: the images of bad frames.
 
-use crate::bad_frames::FrameFault;
+use crate::bad_frames::{BadFrames, FrameFault};
+use crate::effects::frame_effect::FrameEffect;
 use crate::procedural_noise::{RandomStream, ValueNoise, derived_seed};
 use rand::Rng;
 use std::f64::consts::PI;
@@ -13,15 +14,27 @@ const OBJECT_GREY: f32 = 25.0;
 /// Texture of the object: amplitude (grey levels) and cell size (pixels) of each octave.
 const OBJECT_TEXTURE: [(f32, f64); 2] = [(10.0, 24.0), (8.0, 5.0)];
 
+/// Faults of the frames of a survey.
+pub(super) struct InjectedFaults {
+    /// The frames with a fault.
+    pub bad_frames: BadFrames,
+    /// Seed of the survey.
+    pub seed: u64,
+}
+
+impl FrameEffect for InjectedFaults {
+    fn apply(&self, frame: usize, image: GreyImage) -> GreyImage {
+        match self.bad_frames.fault(frame) {
+            Some(fault) => inject_fault(fault, self.seed, frame, image),
+            None => image,
+        }
+    }
+}
+
 /// Applies a fault to the noise-free image of a frame.
 ///
 /// A repeated or missing frame has no image of its own, so its image stays unchanged.
-pub(super) fn inject_fault(
-    fault: FrameFault,
-    seed: u64,
-    frame: usize,
-    image: GreyImage,
-) -> GreyImage {
+fn inject_fault(fault: FrameFault, seed: u64, frame: usize, image: GreyImage) -> GreyImage {
     let mut rng = RandomStream::BadFrames.rng(seed, frame);
     let (width, height) = (image.width(), image.height());
     match fault {

@@ -1,5 +1,6 @@
 //! Vignetting and camera-mounted light: shading that is fixed in the image.
 
+use crate::effects::frame_effect::FrameEffect;
 use tunnelstitch_core::frames::GreyImage;
 
 /// Brightest pixel, as shares of the width and height between the outermost pixel centres.
@@ -43,11 +44,12 @@ impl Vignetting {
         let square = (u - self.spot[0]).powi(2) + (v - self.spot[1]).powi(2);
         (1.0 + self.fall * square).powi(-2)
     }
+}
 
-    /// Applies the shading to a frame.
-    pub fn apply(&self, frame: GreyImage) -> GreyImage {
-        let (width, height) = (frame.width(), frame.height());
-        let data = frame.data().iter().enumerate().map(|(k, light)| {
+impl FrameEffect for Vignetting {
+    fn apply(&self, _frame: usize, image: GreyImage) -> GreyImage {
+        let (width, height) = (image.width(), image.height());
+        let data = image.data().iter().enumerate().map(|(k, light)| {
             let (u, v) = ((k % width) as f64, (k / width) as f64);
             light * self.shade(u, v) as f32
         });
@@ -63,7 +65,10 @@ mod tests {
     fn the_light_falls_smoothly_from_its_spot_to_the_share_in_the_farthest_corner() {
         let (width, height, corner) = (101, 81, 0.3);
         let vignetting = Vignetting::new(corner, width, height);
-        let lit = vignetting.apply(GreyImage::new(width, height, vec![200.0; width * height]));
+        let lit = vignetting.apply(
+            0,
+            GreyImage::new(width, height, vec![200.0; width * height]),
+        );
         assert_eq!(lit.at(60, 32), 200.0);
         assert!((lit.at(0, 80) - 60.0).abs() < 1e-3);
         for (k, light) in lit.data().iter().enumerate() {

@@ -1,5 +1,6 @@
 //! Moving objects between camera and wall: outliers at random positions in every frame.
 
+use crate::effects::frame_effect::FrameEffect;
 use crate::procedural_noise::RandomStream;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -97,13 +98,22 @@ impl MovingObject {
     }
 }
 
+/// Moving objects in every frame.
+pub(super) struct MovingObjects {
+    /// Seed of the survey.
+    pub seed: u64,
+    /// Number of objects in each frame.
+    pub count: u32,
+}
+
+impl FrameEffect for MovingObjects {
+    fn apply(&self, frame: usize, image: GreyImage) -> GreyImage {
+        draw_moving_objects(self.seed, frame, self.count, image)
+    }
+}
+
 /// Draws `count` objects into a frame, at independent random positions in every frame.
-pub(super) fn draw_moving_objects(
-    seed: u64,
-    frame: usize,
-    count: u32,
-    image: GreyImage,
-) -> GreyImage {
+fn draw_moving_objects(seed: u64, frame: usize, count: u32, image: GreyImage) -> GreyImage {
     let (width, height) = (image.width(), image.height());
     let mut rng = RandomStream::MovingObjects.rng(seed, frame);
     let mut light = image.data().to_vec();
