@@ -128,5 +128,5 @@ pub fn pixel_size_on_wall<'p>(
         .copied()
         .unwrap_or(radius_m)
         .min(MAX_VIEWING_DISTANCE_RADII * radius_m)
-        / camera.fy
+        / camera.vertical_focal_px()
 }

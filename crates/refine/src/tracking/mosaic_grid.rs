@@ -69,5 +69,5 @@ impl MosaicGrid {
 pub fn pixel_size_m(context: &EstimationContext, camera: &Camera, pose: &Pose) -> f64 {
     let radius_m = context.surface.perimeter_m() / std::f64::consts::TAU;
     let distance_m = viewing_distance(context.surface.as_ref(), pose).unwrap_or(radius_m);
-    distance_m.min(MAX_VIEWING_DISTANCE_RADII * radius_m) / camera.fy
+    distance_m.min(MAX_VIEWING_DISTANCE_RADII * radius_m) / camera.vertical_focal_px()
 }

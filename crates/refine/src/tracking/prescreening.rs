@@ -131,5 +131,5 @@ fn has_moved(context: &EstimationContext, a: usize, b: usize, coarsest: usize) -
     };
     let rotation = from.r_wc.angle_to(&to.r_wc);
     let translation = (to.t_wc - from.t_wc).norm() / distance_m;
-    (rotation + translation) * context.camera.fy > 2f64.powi(coarsest as i32)
+    (rotation + translation) * context.camera.vertical_focal_px() > 2f64.powi(coarsest as i32)
 }

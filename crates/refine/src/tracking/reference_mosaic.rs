@@ -82,7 +82,8 @@ impl ReferenceMosaic {
             .widened(margin_m);
         // A frame that looks along the tunnel has its detail where the wall is near, for a camera
         // on the axis a radius away.
-        let spacing_m = pixel_size_m(context, camera, pose).min(radius_m / camera.fy);
+        let spacing_m =
+            pixel_size_m(context, camera, pose).min(radius_m / camera.vertical_focal_px());
         let grid = MosaicGrid::over(&footprint, spacing_m);
         let middle = WallPoint {
             s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
