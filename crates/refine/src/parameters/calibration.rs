@@ -16,9 +16,9 @@
 //! | `c_x, c_z` | curvature of the tunnel, 1/m ([`Bend`]) | pixels |
 //!
 //! The first five are the intrinsics
-//! ([`tunnelstitch_geometry::camera::Camera::intrinsics_jacobian`]); of a lens model without k1 and
-//! k2 ([`tunnelstitch_geometry::camera::Lens::has_k1_k2`]), the first three. The readout time is free in
-//! the rolling-shutter test alone ([`crate::uncertainty::rolling_shutter_test`]), the curvature
+//! ([`tunnelstitch_geometry::camera::Camera::intrinsics_jacobian`]), of which a lens model without
+//! k1 and k2 has the first three ([`tunnelstitch_geometry::camera::Lens::has_k1_k2`]). The readout
+//! time is free in the rolling-shutter test alone ([`crate::uncertainty::rolling_shutter_test`]), the curvature
 //! where a straight tunnel's shape is estimated ([`crate::stages::shape`]). With a curvature all
 //! poses are those in the bent tunnel, and a step of it carries them along
 //! ([`Calibration::carry`]).

@@ -3,7 +3,6 @@
 
 use crate::model::problem_error::ProblemError;
 use crate::model::significance::chi_squared_bounds;
-use crate::options::RefineOptions;
 use crate::parameters::calibration::{
     BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa, SHARED_PARAMETERS,
 };
@@ -157,8 +156,8 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_l
 }
 
 /// True if the N shared parameters `which`, of which `count` exist, differ from the given ones by
-/// more than chance: `κᵀ Σ⁻¹ κ`, Σ their covariance, is a χ² variable if they do not. `kappa`: those
-/// where the equations are.
+/// more than chance: `κᵀ Σ⁻¹ κ`, Σ their covariance, is a χ² variable if they do not. `kappa`:
+/// those where the equations are.
 fn is_changed<const N: usize>(
     learned: &LearnedShape,
     kappa: &Kappa,

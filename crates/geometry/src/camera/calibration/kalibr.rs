@@ -24,9 +24,10 @@ fn cameras(tree: &Value) -> impl Iterator<Item = (String, &Value)> {
         .map(|(name, value)| (name.clone(), value))
 }
 
-/// Reads `camera_model`, `intrinsics`, `distortion_model`, `distortion_coeffs` and `resolution`. The
-/// intrinsics are `[fx, fy, cx, cy]` of a pinhole; `omni` has ξ before them, `ds` ξ and α, `eucm`
-/// α and β.
+/// Reads `camera_model`, `intrinsics`, `distortion_model`, `distortion_coeffs` and `resolution`.
+///
+/// The intrinsics are `[fx, fy, cx, cy]` of a pinhole; `omni` has ξ before them, `ds` ξ and α,
+/// `eucm` α and β.
 pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
     let camera = select_camera(cameras(tree).collect(), name)?;
     let model = text_entry(camera, "camera_model").unwrap_or("pinhole");

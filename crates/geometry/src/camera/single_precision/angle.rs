@@ -7,16 +7,16 @@ use crate::camera::thin_prism::{ThinPrismCoefficients, ThinPrismFisheye};
 /// Coefficients of the polynomial that interpolates `atan(√s)/√s` at the Chebyshev nodes of [0, 1],
 /// lowest degree first; it is exact to 3·10⁻⁹.
 const ARCTANGENT: [f32; 10] = [
-    0.999_999_997,
-    -0.333_332_763,
-    0.199_980_753,
-    -0.142_600_161,
-    0.109_323_415,
+    1.0,
+    -0.333_332_78,
+    0.199_980_75,
+    -0.142_600_16,
+    0.109_323_41,
     -0.083_497_25,
-    0.057_089_556_3,
-    -0.030_351_865_1,
-    0.010_487_649_4,
-    -0.001_701_170_09,
+    0.057_089_556,
+    -0.030_351_864,
+    0.010_487_65,
+    -0.001_701_170_1,
 ];
 
 /// Smallest divisor.

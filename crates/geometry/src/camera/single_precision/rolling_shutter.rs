@@ -34,7 +34,7 @@ impl<L> RollingShutter<L> {
         }
     }
 
-    /// The same motion of another lens.
+    /// Replaces the lens.
     #[inline(always)]
     pub(super) fn with_lens<M>(&self, lens: M) -> RollingShutter<M> {
         RollingShutter {
