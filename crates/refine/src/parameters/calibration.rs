@@ -18,9 +18,9 @@
 //! The first five are the intrinsics
 //! ([`tunnelstitch_geometry::camera::Camera::intrinsics_jacobian`]), of which a lens model without
 //! k1 and k2 has the first three ([`tunnelstitch_geometry::camera::Lens::has_k1_k2`]). The readout
-//! time is free in the rolling-shutter test alone ([`crate::uncertainty::rolling_shutter_test`]), the curvature
-//! where a straight tunnel's shape is estimated ([`crate::stages::shape`]). With a curvature all
-//! poses are those in the bent tunnel, and a step of it carries them along
+//! time is free in the rolling-shutter test alone ([`crate::uncertainty::rolling_shutter_test`]),
+//! the curvature where a straight tunnel's shape is estimated ([`crate::stages::shape`]). With a
+//! curvature all poses are those in the bent tunnel, and a step of it carries them along
 //! ([`Calibration::carry`]).
 //!
 //! The images do not change if the radius and all positions are scaled together. Poses are

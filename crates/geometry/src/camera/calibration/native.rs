@@ -18,9 +18,9 @@ enum PixelCentre {
 }
 
 /// A calibration file: `model` ([`Model`]), `width`, `height`, `fx`, `fy`, `cx`, `cy` in pixels;
-/// the parameters of the lens ([`LensKeys`]), of which coefficients are 0 if missing; `max_angle_deg`,
-/// the largest angle off the axis to be used (no limit if missing); and `pixel_centre` ("integer",
-/// the default, or "half").
+/// the parameters of the lens ([`LensKeys`]), of which coefficients are 0 if missing;
+/// `max_angle_deg`, the largest angle off the axis to be used (no limit if missing); and
+/// `pixel_centre` ("integer", the default, or "half").
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraFile {
