@@ -383,26 +383,26 @@ const ROWS: &[Row] = &[
     (
         WriteAndEdit(
             "c.yaml",
-            b"cam0:\n  camera_model: omni\n",
+            b"cam0:\n  camera_model: bal\n",
             TOML,
             "camera.json",
             "c.yaml",
         ),
         CHECK,
         3,
-        &["c.yaml", "omni"],
+        &["c.yaml", "bal"],
     ),
     (
         WriteAndEdit(
             "c.txt",
-            b"1 FOV 480 360 1 1 1 1 1\n",
+            b"1 FULL_FOV 480 360 1 1 1 1 1\n",
             TOML,
             "camera.json",
             "c.txt",
         ),
         CHECK,
         3,
-        &["c.txt:1:", "FOV"],
+        &["c.txt:1:", "FULL_FOV"],
     ),
     (
         WriteAndEdit(

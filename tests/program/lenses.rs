@@ -5,15 +5,22 @@ use crate::support::{fail, simulate, succeed, text};
 
 const PICTURE: &str = r#""width":320,"height":240,"cx":161.5,"cy":118.2"#;
 
+const SMALL_PICTURE: &str = r#""width":160,"height":120,"cx":80.5,"cy":58.9"#;
+
 /// Simulates two turns seen by the camera, refines them, and returns `compare`'s report.
 fn repaired(camera: &str, file: &str) -> serde_json::Value {
+    repaired_of(camera, file, &["--frames", "24", "--supersample", "4"])
+}
+
+/// Simulates a survey with these options seen by the camera, refines it, and returns `compare`'s
+/// report.
+fn repaired_of(camera: &str, file: &str, options: &[&str]) -> serde_json::Value {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     let (survey, out) = (path("survey"), path("refined"));
     let file = path(file);
     std::fs::write(&file, camera).unwrap();
-    let size = ["--frames", "24", "--supersample", "4"];
-    simulate(&survey, &[&size[..], &["--camera", text(&file)]].concat());
+    simulate(&survey, &[options, &["--camera", text(&file)]].concat());
     // The survey has the given camera.
     let own = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
     let given = tunnelstitch::camera::read_calibration(&file, None).unwrap();
@@ -61,6 +68,88 @@ fn a_lens_with_tangential_distortion_is_repaired() {
                   -0.002]\n  distortion_model: radtan\n  \
                   intrinsics: [207.5, 208.0, 161.5, 118.2]\n  resolution: [320, 240]\n";
     assert_repaired(&repaired(camera, "camchain.yaml"));
+}
+
+/// Models with their parameters and focal lengths, for the same angle of view.
+const MODELS: [(&str, &str, f64); 6] = [
+    (
+        "mei",
+        r#""xi":1.2,"k1":-0.2,"k2":0.05,"p1":0.001,"p2":-0.002"#,
+        165.0,
+    ),
+    ("double-sphere", r#""xi":-0.25,"alpha":0.57"#, 56.25),
+    ("eucm", r#""alpha":0.63,"beta":1.04"#, 75.0),
+    ("fov", r#""omega":0.93"#, 69.0),
+    (
+        "thin-prism-fisheye",
+        r#""k1":-0.01,"k2":0.005,"k3":-0.004,"k4":0.0007,"p1":0.001,"p2":-0.002,"sx1":0.001"#,
+        75.0,
+    ),
+    (
+        "ocam",
+        r#""polynomial":[-0.31,-0.02,0.0,0.01],"c":1.001,"d":0.002,"e":-0.003"#,
+        75.0,
+    ),
+];
+
+/// A camera.json of a model.
+fn own_file((model, parameters, focal): (&str, &str, f64)) -> String {
+    format!(r#"{{"model":"{model}",{SMALL_PICTURE},"fx":{focal},"fy":{focal},{parameters}}}"#)
+}
+
+#[test]
+fn every_wide_angle_lens_is_repaired() {
+    for model in MODELS {
+        let options = ["--frames", "14", "--supersample", "3"];
+        let report = repaired_of(&own_file(model), "camera.json", &options);
+        let wall_px = |which: &str| report[which]["wall"]["px"]["rms"].as_f64().unwrap();
+        assert!(wall_px("baseline") > 5.0, "{model:?}: {report}");
+        assert!(wall_px("refined") < 0.2, "{model:?}: {report}");
+    }
+}
+
+/// COLMAP has three of the models; the others are refused by name.
+#[test]
+fn models_are_exported_or_refused_by_name() {
+    for model in MODELS {
+        let dir = tempfile::tempdir().unwrap();
+        let path = |name: &str| dir.path().join(name);
+        std::fs::write(path("camera.json"), own_file(model)).unwrap();
+        let (survey, file) = (path("survey"), path("camera.json"));
+        let size = ["--frames", "2", "--camera", text(&file)];
+        simulate(&survey, &size);
+        let convert = |format, out| {
+            let out = path(out);
+            let poses = survey.join("groundtruth.tum");
+            let arguments = [
+                "convert",
+                text(&survey),
+                "--poses",
+                text(&poses),
+                "--to",
+                format,
+                "--out",
+                text(&out),
+            ];
+            arguments.map(str::to_owned)
+        };
+        let colmap = convert("colmap", "sparse");
+        let colmap = colmap.each_ref().map(String::as_str);
+        if matches!(model.0, "eucm" | "fov" | "thin-prism-fisheye") {
+            succeed(&colmap);
+            let written = path("sparse").join("cameras.txt");
+            let read = |path| tunnelstitch::camera::read_calibration(path, None).unwrap();
+            assert_eq!(read(&written), read(&file));
+        } else {
+            let message = fail(&colmap, 3);
+            let expected = format!("COLMAP has no lens model {}", model.0);
+            assert!(message.contains(&expected), "{message}");
+        }
+        let nerfstudio = convert("nerfstudio", "transforms.json");
+        let message = fail(&nerfstudio.each_ref().map(String::as_str), 3);
+        assert!(message.contains("has no lens model"), "{message}");
+        succeed(&convert("tum", "poses.tum").each_ref().map(String::as_str));
+    }
 }
 
 #[test]

@@ -34,6 +34,19 @@ const KALIBR: &str = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.3
                       - [0, 0, 0, 1]\n";
 const CAMERAS: &str =
     "# cameras\n1 FULL_OPENCV 640 480 415 417 318 241 4.1 2.0 -0.0004 0.0006 0.1 4.4 3.1 0.45\n";
+const MEI: &str = "%YAML:1.0\n---\nmodel_type: MEI\nimage_width: 640\nimage_height: \
+                   480\nmirror_parameters:\n   xi: 0.9\ndistortion_parameters:\n   k1: -0.2\n   \
+                   k2: 0.03\n   p1: 0.001\n   p2: -0.002\nprojection_parameters:\n   gamma1: \
+                   415.\n   gamma2: 417.\n   u0: 318.\n   v0: 241.\n";
+const BASALT: &str = r#"{"value0": {"intrinsics": [{"camera_type": "ds", "intrinsics": {"fx": 349.7,
+ "fy": 348.7, "cx": 365.8, "cy": 249.3, "xi": -0.24, "alpha": 0.56}}],
+ "resolution": [[752, 480]]}}"#;
+const OCAM: &str = "5 -230 0 7.5e-3 -6e-5 1.6e-7\n3 268.0 71.0 -20.0\n240.4 318.5\n1.01 0.002 \
+                    -0.003\n480 640\n";
+const THIN_PRISM: &str = "1 THIN_PRISM_FISHEYE 640 480 300 300 320 240 -0.01 0.005 0.001 -0.002 \
+                          -0.004 0.0007 0.0003 -0.0005\n";
+const OWN_OCAM: &str = r#"{"model": "ocam", "width": 640, "height": 480, "fx": 230, "fy": 230,
+ "cx": 320, "cy": 240, "polynomial": [-1.72, 3.17, -1.95], "c": 1.01, "d": 0.002, "e": -0.003}"#;
 const AXIS: &str = r#"{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}"#;
 const SURVEY: &str = "[tunnel]\nshape = \"circle\"\nradius_m = 3.0\nignore = [{ theta_deg = [150, \
                       210], chainage_m = [2.0, 5.5] }]\n[camera]\nfile = \
@@ -43,7 +56,7 @@ const SURVEY: &str = "[tunnel]\nshape = \"circle\"\nradius_m = 3.0\nignore = [{ 
                       0.02, 0.03]\n\
                       [options.stitch]\nmode = \"average\"\n";
 
-const SAMPLES: [(&str, &str); 12] = [
+const SAMPLES: [(&str, &str); 17] = [
     ("poses.tum", TUM),
     ("poses.txt", KITTI),
     ("poses.csv", CSV),
@@ -54,6 +67,11 @@ const SAMPLES: [(&str, &str); 12] = [
     ("camera.yml", OPENCV),
     ("camchain.yaml", KALIBR),
     ("cameras.txt", CAMERAS),
+    ("camera.yaml", MEI),
+    ("calibration.json", BASALT),
+    ("calib_results.txt", OCAM),
+    ("cameras.txt", THIN_PRISM),
+    ("camera.json", OWN_OCAM),
     ("axis.json", AXIS),
     ("survey.toml", SURVEY),
 ];

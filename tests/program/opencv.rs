@@ -33,6 +33,7 @@ fn projections_agree_with_opencv() {
             cy: 241.125,
             lens: lens(model),
             sweep: Sweep::default(),
+            max_range_m: f64::INFINITY,
         };
         let x_c = Vector3::new(numbers[0], numbers[1], numbers[2]);
         let pixel = camera.project(&x_c).unwrap();

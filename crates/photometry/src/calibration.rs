@@ -227,9 +227,8 @@ mod tests {
     fn differs(found: &[f64; SHADING_TERMS], truth: &[f64; SHADING_TERMS]) -> f64 {
         let none = Shading::none(SIZE);
         let place = |k: usize, steps: usize, of: usize| (k * (of - 1)) as f64 / steps as f64;
-        let pixels = (0..25 * 33).map(|k| {
-            nalgebra::Vector2::new(place(k % 33, 32, SIZE.0), place(k / 33, 24, SIZE.1))
-        });
+        let pixels = (0..25 * 33)
+            .map(|k| nalgebra::Vector2::new(place(k % 33, 32, SIZE.0), place(k / 33, 24, SIZE.1)));
         none.changed(found)
             .relative_difference(&none.changed(truth), pixels)
     }

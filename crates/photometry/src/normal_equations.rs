@@ -294,7 +294,9 @@ mod tests {
     #[test]
     fn the_solution_is_the_minimum_of_the_cost() {
         let points = points();
-        let solution = normal(&points).solve(&PRIORS, VARIANCE).unwrap();
+        let solution = normal(&points)
+            .solve(&PRIORS, VARIANCE, &[0.0; SHADING_TERMS])
+            .unwrap();
         let x = flat(&solution.x);
         let sigma = |k: usize| match k.checked_sub(FRAME_UNKNOWNS * FRAMES) {
             Some(_) => PRIORS.shading_sigma,
@@ -345,7 +347,10 @@ mod tests {
         }
         sparse.fill_upper_triangle_with_lower_triangle();
         assert!((&sparse - &matrix).amax() < 1e-10);
-        let cofactors = normal.solve(&PRIORS, VARIANCE, &[0.0; SHADING_TERMS]).unwrap().shading_cofactors();
+        let cofactors = normal
+            .solve(&PRIORS, VARIANCE, &[0.0; SHADING_TERMS])
+            .unwrap()
+            .shading_cofactors();
         let inverse = matrix.try_inverse().unwrap();
         let expected = inverse.view_range(FRAME_UNKNOWNS * FRAMES.., FRAME_UNKNOWNS * FRAMES..);
         assert!((cofactors - expected).amax() < 1e-8 * expected.amax());

@@ -128,5 +128,5 @@ pub(super) fn texel_size_m(tunnel: &Tunnel, camera: &Camera, truth: &[Pose]) -> 
         .iter()
         .map(|pose| tunnel.radial_position(&pose.t_wc).0);
     let nearest_m = tunnel.nearest_m() * (1.0 - outward.fold(0.0, f64::max)).max(0.5);
-    (nearest_m / camera.fy / TEXELS_PER_PIXEL).min(MAX_TEXEL_M)
+    (nearest_m / camera.vertical_focal_px() / TEXELS_PER_PIXEL).min(MAX_TEXEL_M)
 }

@@ -1,6 +1,6 @@
 //! `tunnelstitch convert`: writes poses in another format.
 
-use crate::camera::ColmapCamera;
+use crate::camera::{ColmapCamera, UnknownModelError};
 use crate::cli::arguments::PosesArguments;
 use crate::cli::output::{
     Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, record, refuse_overwriting,
@@ -77,7 +77,9 @@ pub fn run(
             frame.file().display()
         ));
     }
-    let camera = ColmapCamera::of(&survey.camera);
+    let camera = || {
+        ColmapCamera::of(&survey.camera).map_err(|error| unknown_model(&error, "tum, kitti or csv"))
+    };
     let names = || survey.frame_paths_from(&survey.folder);
     let text = match arguments.to {
         OutputFormat::Tum => tum::format(&trajectory),
@@ -85,16 +87,12 @@ pub fn run(
         OutputFormat::Csv => csv::format(&names(), &trajectory),
         OutputFormat::Nerfstudio => {
             let folder = out.parent().unwrap_or(Path::new(""));
-            let keys = camera.nerfstudio().ok_or_else(|| {
-                Failure::input(
-                    "nerfstudio has no lens model with k4 to k6; write colmap, or calibrate with 5 \
-                     coefficients",
-                )
-            })?;
+            let keys = camera()?.nerfstudio();
+            let keys = keys.map_err(|error| unknown_model(&error, "colmap"))?;
             nerfstudio::format(keys, &survey.frame_paths_from(folder), &trajectory)
         }
         OutputFormat::Colmap => {
-            write_colmap(out, &camera, &names(), &trajectory)?;
+            write_colmap(out, &camera()?, &names(), &trajectory)?;
             record.write(&out.join(RUN_FILE), &inputs)?;
             terminal.say(format!(
                 "wrote {} poses to {}",
@@ -113,6 +111,14 @@ pub fn run(
         out.display()
     ));
     Ok(())
+}
+
+/// The failure of a format that cannot hold the camera's lens.
+fn unknown_model(error: &UnknownModelError, other: &str) -> Failure {
+    Failure::input(format!(
+        "{error}; write {other}, or calibrate with a model that it has (PINHOLE, OPENCV, \
+         OPENCV_FISHEYE)"
+    ))
 }
 
 /// Files of a COLMAP model.

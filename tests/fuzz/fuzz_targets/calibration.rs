@@ -17,7 +17,7 @@ fuzz_target!(|data: &[u8]| {
     if let Ok(camera) = read_calibration(&path, None) {
         // A camera that was read can be used and written.
         let _ = camera.border(4, 0.5);
-        let _ = ColmapCamera::of(&camera).cameras_txt();
+        let _ = ColmapCamera::of(&camera).map(|colmap| colmap.cameras_txt());
         let (_folder, own) = file("own.json", format_calibration(&camera).as_bytes());
         assert_eq!(read_calibration(&own, None).unwrap(), camera);
     }

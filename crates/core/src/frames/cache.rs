@@ -38,7 +38,7 @@ pub struct FrameCache {
 
 #[derive(Debug)]
 enum Source {
-    Files(FrameSet, Camera),
+    Files(FrameSet, Box<Camera>),
     Memory(Vec<Arc<Pyramid>>),
 }
 
@@ -73,7 +73,7 @@ impl FrameCache {
             )
         };
         Self {
-            source: Source::Files(frames.clone(), *camera),
+            source: Source::Files(frames.clone(), Box::new(*camera)),
             levels,
             shading: RwLock::default(),
             room: room.max(1),

@@ -228,10 +228,7 @@ mod tests {
         let pixels = || [0.0, 31.0, 63.0].map(|x| Vector2::new(x, 20.0));
         let difference = |a: &Shading, b: &Shading| a.relative_difference(b, pixels());
         assert!((difference(&sloped, &none) - 0.03).abs() < 1e-12);
-        assert_eq!(
-            difference(&sloped, &none),
-            difference(&none, &sloped)
-        );
+        assert_eq!(difference(&sloped, &none), difference(&none, &sloped));
         assert_eq!(difference(&sloped, &sloped), 0.0);
     }
 

@@ -132,7 +132,8 @@ impl MeanSquares {
         for ray_c in camera.corner_and_centre_rays() {
             if let Ok(hit) = sighted_wall(surface, camera, pose, &ray_c) {
                 let a = wall_jacobian(pose, &surface.frame(hit.wall));
-                wall += (a * square * a.transpose()).trace() * (camera.fy / hit.range).powi(2);
+                wall += (a * square * a.transpose()).trace()
+                    * (camera.vertical_focal_px() / hit.range).powi(2);
                 points += 1.0;
             }
         }
@@ -293,7 +294,7 @@ fn refine_survey(
 
 /// Estimates the spectrum of a wall's texture, as sampled by a frame in the middle of the tunnel.
 fn estimate_texture(scene: &Scene, noise_grey: f64) -> UnknownTexture {
-    let columns = (TAU * scene.camera().fy * f64::from(FINER)).round() as usize;
+    let columns = (TAU * scene.camera().vertical_focal_px() * f64::from(FINER)).round() as usize;
     let finer = FINER as usize;
     let side = UnknownTexture::min_side(finer);
     let wall = scene.wall(columns.max(side), 2 * side, 0.0);

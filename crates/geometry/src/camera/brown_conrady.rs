@@ -1,8 +1,9 @@
 //! The Brown–Conrady lens model.
 
-use super::monotone::{invert_monotone, monotone_limit};
+use super::monotone::invert_monotone;
+use super::planar_inverse::{invert_planar, planar_limit};
 use nalgebra::{Matrix2, Vector2};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 /// Coefficients of a Brown–Conrady lens, in OpenCV's convention and names. The plain polynomial (4
 /// or 5 coefficients) has `k4 = k5 = k6 = 0`.
@@ -35,14 +36,8 @@ pub struct BrownConrady {
     limit: f64,
 }
 
-/// Directions in which the limit of a lens with tangential distortion is determined.
-const LIMIT_DIRECTIONS: usize = 72;
 /// Largest radius |p| at which the limit is searched: 89.4° off the axis.
 const MAX_RADIUS: f64 = 100.0;
-/// Newton iterations of the inverse.
-const MAX_NEWTON_ITERATIONS: usize = 50;
-/// Residual at which the inverse has converged, for rays with z = 1.
-const RESIDUAL_TOLERANCE: f64 = 1e-14;
 
 impl BrownConrady {
     /// Creates the lens with these coefficients and determines its limit.
@@ -55,30 +50,17 @@ impl BrownConrady {
         if coefficients == BrownCoefficients::default() {
             return lens;
         }
-        let directions = if coefficients.p == [0.0; 2] {
-            1
-        } else {
-            LIMIT_DIRECTIONS
+        let determinant = |p: &Vector2<f64>| {
+            let (f, _) = lens.factor(p.norm_squared());
+            // Beyond a pole the factor is negative.
+            if f > 0.0 {
+                lens.jacobian(p).determinant()
+            } else {
+                -1.0
+            }
         };
-        let rises = |k: usize| {
-            let (sin, cos) = (TAU * k as f64 / directions as f64).sin_cos();
-            let direction = Vector2::new(cos, sin);
-            let determinant = |rho: f64| {
-                let at = direction * rho;
-                let (f, _) = lens.factor(at.norm_squared());
-                // Beyond a pole the factor is negative.
-                if f > 0.0 {
-                    lens.jacobian(&at).determinant()
-                } else {
-                    -1.0
-                }
-            };
-            monotone_limit(determinant, MAX_RADIUS)
-        };
-        lens.limit = (0..directions)
-            .map(rises)
-            .fold(f64::INFINITY, f64::min)
-            .powi(2);
+        let is_symmetric = coefficients.p == [0.0; 2];
+        lens.limit = planar_limit(determinant, MAX_RADIUS, is_symmetric).powi(2);
         lens
     }
 
@@ -163,8 +145,7 @@ impl BrownConrady {
     /// Inverts the distortion of `p_d`; None if no point within the limit maps to it.
     ///
     /// The radial part has one unknown ([`invert_monotone`]). Newton's method then removes the
-    /// tangential distortion; steps are halved until they reduce the residual and stay within the
-    /// limit.
+    /// tangential distortion ([`invert_planar`]).
     pub fn undistort(&self, p_d: &Vector2<f64>) -> Option<Vector2<f64>> {
         let target = p_d.norm();
         if self.is_distortion_free() || target == 0.0 {
@@ -182,30 +163,13 @@ impl BrownConrady {
         }
         // Without a radial solution the tangential part may still allow one.
         let start = rho.unwrap_or(0.9 * end.min(target)).min(0.999 * end);
-        let mut p = p_d * (start / target);
-        let mut error = self.distort(&p) - p_d;
-        for _ in 0..MAX_NEWTON_ITERATIONS {
-            let step = self.jacobian(&p).try_inverse()? * error;
-            let mut share = 1.0;
-            let (next, next_error) = loop {
-                let next = p - step * share;
-                let next_error = self.distort(&next) - p_d;
-                let better = next_error.norm() < error.norm();
-                if next.norm_squared() < self.limit && better {
-                    break (next, next_error);
-                }
-                share *= 0.5;
-                if share < 1e-6 {
-                    let exact = error.norm() <= RESIDUAL_TOLERANCE * (1.0 + target) * 100.0;
-                    return exact.then_some(p);
-                }
-            };
-            (p, error) = (next, next_error);
-            if error.norm() <= RESIDUAL_TOLERANCE * (1.0 + target) {
-                break;
-            }
-        }
-        (error.norm() <= RESIDUAL_TOLERANCE * (1.0 + target) * 100.0).then_some(p)
+        invert_planar(
+            p_d,
+            p_d * (start / target),
+            self.limit,
+            |p| self.distort(p),
+            |p| self.jacobian(p),
+        )
     }
 }
 
@@ -213,6 +177,7 @@ impl BrownConrady {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::f64::consts::TAU;
 
     fn lens(k: [f64; 6], p: [f64; 2]) -> BrownConrady {
         BrownConrady::new(BrownCoefficients { k, p })

@@ -3,7 +3,18 @@
 use super::brown_conrady::BrownCoefficients;
 use super::lens::Lens;
 use super::projection::Camera;
+use super::thin_prism::ThinPrismCoefficients;
 use serde_json::{Map, Value, json};
+
+/// A lens that another program has no model for.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{program} has no lens model {model}")]
+pub struct UnknownModelError {
+    /// Name of the program.
+    pub program: &'static str,
+    /// Name of the model.
+    pub model: &'static str,
+}
 
 /// A camera model of COLMAP with its parameters; pixels count from the corner of the first, whose
 /// centre is (½, ½).
@@ -23,8 +34,12 @@ pub struct ColmapCamera {
 
 impl ColmapCamera {
     /// `PINHOLE` for a lens without distortion, `OPENCV` for k1, k2, p1, p2, `FULL_OPENCV` for
-    /// more, `OPENCV_FISHEYE` for a fisheye. The largest usable angle is not exported.
-    pub fn of(camera: &Camera) -> Self {
+    /// more, `OPENCV_FISHEYE` for a Kannala–Brandt fisheye, `THIN_PRISM_FISHEYE`, `FOV`, `EUCM`.
+    /// The largest usable angle is not exported.
+    ///
+    /// # Errors
+    /// [`UnknownModelError`] for the other lenses.
+    pub fn of(camera: &Camera) -> Result<Self, UnknownModelError> {
         let mut parameters = vec![
             ("fx", camera.fx),
             ("fy", camera.fy),
@@ -57,13 +72,37 @@ impl ColmapCamera {
                 );
                 "OPENCV_FISHEYE"
             }
+            Lens::ThinPrismFisheye(lens) => {
+                let ThinPrismCoefficients {
+                    k: [k1, k2, k3, k4],
+                    p: [p1, p2],
+                    s: [sx1, sy1],
+                } = *lens.coefficients();
+                parameters.extend([("k1", k1), ("k2", k2), ("p1", p1), ("p2", p2)]);
+                parameters.extend([("k3", k3), ("k4", k4), ("sx1", sx1), ("sy1", sy1)]);
+                "THIN_PRISM_FISHEYE"
+            }
+            Lens::Fov(lens) => {
+                parameters.push(("omega", lens.omega()));
+                "FOV"
+            }
+            Lens::Eucm(lens) => {
+                parameters.extend(["alpha", "beta"].into_iter().zip(lens.parameters()));
+                "EUCM"
+            }
+            Lens::Mei(_) | Lens::DoubleSphere(_) | Lens::Ocam(_) => {
+                return Err(UnknownModelError {
+                    program: "COLMAP",
+                    model: camera.lens.name(),
+                });
+            }
         };
-        Self {
+        Ok(Self {
             model,
             width: camera.width,
             height: camera.height,
             parameters,
-        }
+        })
     }
 
     /// The text of a `cameras.txt` with this camera only, number 1.
@@ -80,14 +119,23 @@ impl ColmapCamera {
         )
     }
 
-    /// The keys of the camera in nerfstudio's `transforms.json`, whose `OPENCV` includes k3; None
-    /// for a rational lens (k4 to k6), which nerfstudio lacks.
-    pub fn nerfstudio(&self) -> Option<Map<String, Value>> {
+    /// The keys of the camera in nerfstudio's `transforms.json`, whose `OPENCV` includes k3.
+    ///
+    /// # Errors
+    /// [`UnknownModelError`] for a rational lens (k4 to k6) and for models that nerfstudio lacks.
+    pub fn nerfstudio(&self) -> Result<Map<String, Value>, UnknownModelError> {
         let rational =
             |(name, value): &(&str, f64)| matches!(*name, "k4" | "k5" | "k6") && *value != 0.0;
         let full = self.model == "FULL_OPENCV";
+        let unknown = |model| UnknownModelError {
+            program: "nerfstudio",
+            model,
+        };
         if full && self.parameters.iter().any(rational) {
-            return None;
+            return Err(unknown("with k4 to k6"));
+        }
+        if matches!(self.model, "THIN_PRISM_FISHEYE" | "FOV" | "EUCM") {
+            return Err(unknown(self.model));
         }
         let model = if full { "OPENCV" } else { self.model };
         let count = if full { 9 } else { self.parameters.len() };
@@ -103,7 +151,7 @@ impl ColmapCamera {
             };
             keys.insert(name.to_owned(), json!(value));
         }
-        Some(keys)
+        Ok(keys)
     }
 }
 
@@ -111,16 +159,20 @@ impl ColmapCamera {
 mod tests {
     use super::*;
     use crate::camera::brown_conrady::BrownConrady;
+    use crate::camera::double_sphere::DoubleSphere;
+    use crate::camera::eucm::Eucm;
+    use crate::camera::fov::Fov;
     use crate::camera::kannala_brandt::KannalaBrandt;
+    use crate::camera::thin_prism::ThinPrismFisheye;
 
     #[test]
     fn pixels_count_from_the_corner() {
         let camera = Camera::from_vertical_fov(640, 480, 1.0);
-        let colmap = ColmapCamera::of(&camera);
+        let colmap = ColmapCamera::of(&camera).unwrap();
         assert_eq!(colmap.model, "PINHOLE");
         // The middle of the image is half its size.
         assert_eq!(colmap.parameters[2..], [("cx", 320.0), ("cy", 240.0)]);
-        let with = |lens| ColmapCamera::of(&Camera { lens, ..camera });
+        let with = |lens| ColmapCamera::of(&Camera { lens, ..camera }).unwrap();
         let distorted = with(Lens::radial(-0.1, 0.02));
         let text = distorted.cameras_txt();
         assert!(
@@ -141,7 +193,12 @@ mod tests {
             crate::camera::read_calibration(&path, None).unwrap()
         };
         let fisheye = KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]);
-        for (lens, rational) in [
+        let thin_prism = ThinPrismFisheye::new(ThinPrismCoefficients {
+            k: [-0.01, 0.005, -0.004, 0.0007],
+            p: [1e-3, -2e-3],
+            s: [3e-4, -5e-4],
+        });
+        for (lens, is_unknown) in [
             (Lens::default(), false),
             (brown([-0.3, 0.1, 0.0, 0.0, 0.0, 0.0], [1e-3, -2e-3]), false),
             (
@@ -150,18 +207,31 @@ mod tests {
             ),
             (brown([4.1, 2.0, 0.1, 4.4, 3.1, 0.45], [-4e-4, 6e-4]), true),
             (Lens::KannalaBrandt(fisheye), false),
+            (Lens::ThinPrismFisheye(thin_prism.unwrap()), true),
+            (Lens::Fov(Fov::new(0.93).unwrap()), true),
+            (Lens::Eucm(Eucm::new(0.63, 1.04).unwrap()), true),
         ] {
             let camera = Camera {
                 lens,
                 ..Camera::from_vertical_fov(640, 480, 1.0)
             };
-            let colmap = ColmapCamera::of(&camera);
+            let colmap = ColmapCamera::of(&camera).unwrap();
             assert_eq!(read("cameras.txt", colmap.cameras_txt()), camera);
             let keys = colmap.nerfstudio();
-            assert_eq!(keys.is_none(), rational);
-            if let Some(keys) = keys {
+            assert_eq!(keys.is_err(), is_unknown);
+            if let Ok(keys) = keys {
                 assert_eq!(read("transforms.json", json!(keys).to_string()), camera);
             }
         }
+    }
+
+    #[test]
+    fn a_lens_without_a_model_is_refused_by_name() {
+        let camera = Camera {
+            lens: Lens::DoubleSphere(DoubleSphere::new(-0.2, 0.6).unwrap()),
+            ..Camera::from_vertical_fov(640, 480, 1.0)
+        };
+        let message = ColmapCamera::of(&camera).unwrap_err().to_string();
+        assert_eq!(message, "COLMAP has no lens model double-sphere");
     }
 }

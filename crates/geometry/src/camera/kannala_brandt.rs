@@ -1,7 +1,8 @@
 //! The Kannala–Brandt fisheye model.
 
 use super::monotone::{invert_monotone, monotone_limit};
-use nalgebra::{Matrix2, Matrix2x3, RowVector3, Vector2, Vector3};
+use super::radial::{is_on_axis, project_radial, radial_jacobian, radial_ray};
+use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use std::f64::consts::PI;
 
 /// Fisheye projection: a point at the angle θ off the axis appears at the distance
@@ -20,9 +21,6 @@ pub struct KannalaBrandt {
     max_angle_rad: f64,
     limit_rad: f64,
 }
-
-/// Smallest ratio of the distance from the axis to z that is divided by.
-const MIN_RADIAL_RATIO: f64 = 1e-9;
 
 impl KannalaBrandt {
     /// Creates the lens with the coefficients k1 to k4 and determines its limit.
@@ -69,40 +67,20 @@ impl KannalaBrandt {
 
     /// Projects a point; None beyond the limit.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
-        let rho = x_c.xy().norm();
-        let theta = rho.atan2(x_c.z);
-        if theta >= self.limit_rad || !theta.is_finite() {
-            return None;
-        }
-        if rho <= MIN_RADIAL_RATIO * x_c.z {
-            return (x_c.z > 0.0).then(|| x_c.xy() / x_c.z);
-        }
-        Some(x_c.xy() * (self.radius(theta).0 / rho))
+        project_radial(x_c, self.limit_rad, 1.0, |theta| self.radius(theta).0)
     }
 
-    /// `∂p_d/∂x_c = θ_d′ e ∂θ/∂x_c + (θ_d/ρ) (I − e eᵀ) ∂(x, y)/∂x_c` with `e = (x, y)/ρ`,
-    /// `ρ = √(x² + y²)`, `∂θ/∂x_c = (z eᵀ, −ρ)/(ρ² + z²)`.
+    /// `∂p_d/∂x_c` ([`radial_jacobian`]).
     pub fn jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
-        let rho = x_c.xy().norm();
-        if rho <= MIN_RADIAL_RATIO * x_c.z {
-            return Matrix2x3::identity() / x_c.z;
-        }
-        let e = x_c.xy() / rho;
-        let (radius, slope) = self.radius(rho.atan2(x_c.z));
-        let theta = RowVector3::new(x_c.z * e.x, x_c.z * e.y, -rho) / x_c.norm_squared();
-        let around = (Matrix2::identity() - e * e.transpose()) * (radius / rho);
-        let mut jacobian = e * theta * slope;
-        let mut across = jacobian.fixed_columns_mut::<2>(0);
-        across += around;
-        jacobian
+        radial_jacobian(x_c, 1.0, |theta| self.radius(theta))
     }
 
-    /// `∂p_d/∂(k1, k2) = (θ³ e, θ⁵ e)`.
+    /// `∂p_d/∂(k1, k2) = (θ³ e, θ⁵ e)`, `e = (x, y)/√(x² + y²)`.
     pub fn coefficient_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2<f64> {
-        let rho = x_c.xy().norm();
-        if rho <= MIN_RADIAL_RATIO * x_c.z {
+        if is_on_axis(x_c) {
             return Matrix2::zeros();
         }
+        let rho = x_c.xy().norm();
         let e = x_c.xy() / rho;
         let theta = rho.atan2(x_c.z);
         Matrix2::from_columns(&[e * theta.powi(3), e * theta.powi(5)])
@@ -110,15 +88,8 @@ impl KannalaBrandt {
 
     /// Back-projects `p_d` to a unit vector; None beyond the limit.
     pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
-        let radius = p_d.norm();
-        let theta = invert_monotone(|theta| self.radius(theta), radius, self.limit_rad)?;
-        let e = if radius > 0.0 {
-            p_d / radius
-        } else {
-            Vector2::zeros()
-        };
-        let (sin, cos) = theta.sin_cos();
-        Some((e * sin).push(cos))
+        let theta = invert_monotone(|theta| self.radius(theta), p_d.norm(), self.limit_rad)?;
+        Some(radial_ray(p_d, theta))
     }
 }
 

@@ -40,7 +40,8 @@ pub fn monotone_limit(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
 /// Solves `f(x) = target ≥ 0` for `x` in `[0, end]`, where `f` returns value and slope and rises;
 /// None if f(end) is less than the target.
 ///
-/// Newton's method, safeguarded by a bracket around the root.
+/// Newton's method, safeguarded by a bracket around the root; bisection of the bracket if Newton's
+/// method goes in circles.
 pub fn invert_monotone(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> Option<f64> {
     if target == 0.0 {
         return Some(0.0);
@@ -71,8 +72,20 @@ pub fn invert_monotone(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> 
         }
         x = next;
     }
+    let is_root = |x: f64| (f(x).0 - target).abs() <= 1e-12 * target;
     // The last bit alternates.
-    ((f(x).0 - target).abs() <= 1e-12 * target).then_some(x)
+    if is_root(x) {
+        return Some(x);
+    }
+    for _ in 0..MAX_INVERSION_ITERATIONS {
+        let middle = 0.5 * (low + high);
+        if f(middle).0 > target {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    is_root(low).then_some(low)
 }
 
 #[cfg(test)]
@@ -103,6 +116,10 @@ mod tests {
         }
         assert!(invert_monotone(f, 0.4, end).is_none());
         assert!(invert_monotone(f, f64::NAN, end).is_none());
+        // Newton's method goes in a circle of two within the bracket.
+        let wavy = |x: f64| (x + 0.99 * (x - 2.0).sin() + 0.99 * 2f64.sin(), 1.0);
+        let back = invert_monotone(wavy, wavy(2.0).0, 4.0).unwrap();
+        assert!((wavy(back).0 - wavy(2.0).0).abs() < 1e-11);
         let steep = invert_monotone(|x| (x * x * x, 3.0 * x * x), 1e6, f64::INFINITY).unwrap();
         assert!((steep - 100.0).abs() < 1e-9);
     }

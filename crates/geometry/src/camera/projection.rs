@@ -78,8 +78,8 @@ impl Camera {
         ((v - 0.5 * (height - 1.0)) / height).clamp(-MAX_SHARE, MAX_SHARE)
     }
 
-    /// Back-projects a pixel to a direction in camera coordinates (z = 1; unit length for a
-    /// fisheye); None outside the lens's field of view.
+    /// Back-projects a pixel to a direction in camera coordinates (z = 1 for a pinhole with
+    /// or without distortion, unit length for the others); None outside the lens's field of view.
     pub fn ray(&self, u: f64, v: f64) -> Option<Vector3<f64>> {
         let ray = self.lens.ray(&Vector2::new(
             (u - self.cx) / self.fx,
@@ -265,9 +265,15 @@ impl Camera {
             .collect()
     }
 
-    /// Focal length, pixels: the geometric mean of fx and fy.
+    /// Focal length on the axis, pixels: the geometric mean of fx and fy times the lens's scale
+    /// there ([`Lens::axis_scale`]).
     pub fn focal_px(&self) -> f64 {
-        (self.fx * self.fy).sqrt()
+        (self.fx * self.fy).sqrt() * self.lens.axis_scale()
+    }
+
+    /// Focal length on the axis along v, pixels: fy times the lens's scale there.
+    pub fn vertical_focal_px(&self) -> f64 {
+        self.fy * self.lens.axis_scale()
     }
 
     /// Rays through a regular grid of 9 × 7 pixels, the image's border included, without those

@@ -27,7 +27,7 @@ fn names(count: usize) -> Vec<String> {
 /// Formats the poses in every writable format.
 fn written(trajectory: &[StampedPose]) -> Vec<(PoseFormat, String)> {
     let names = names(trajectory.len());
-    let camera = ColmapCamera::of(&Camera::from_vertical_fov(64, 48, 1.0));
+    let camera = ColmapCamera::of(&Camera::from_vertical_fov(64, 48, 1.0)).unwrap();
     vec![
         (PoseFormat::Tum, tum::format(trajectory)),
         (PoseFormat::Kitti, kitti::format(trajectory)),

@@ -16,10 +16,11 @@
 //! | `c_x, c_z` | curvature of the tunnel, 1/m ([`Bend`]) | pixels |
 //!
 //! The first five are the intrinsics
-//! ([`tunnelstitch_geometry::camera::Camera::intrinsics_jacobian`]). The readout time is free in
-//! the rolling-shutter test alone ([`crate::uncertainty::rolling_shutter_test`]), the curvature
-//! where a straight tunnel's shape is estimated ([`crate::stages::shape`]). With a curvature all
-//! poses are those in the bent tunnel, and a step of it carries them along
+//! ([`tunnelstitch_geometry::camera::Camera::intrinsics_jacobian`]), of which a lens model without
+//! k1 and k2 has the first three ([`tunnelstitch_geometry::camera::Lens::has_k1_k2`]). The readout
+//! time is free in the rolling-shutter test alone ([`crate::uncertainty::rolling_shutter_test`]),
+//! the curvature where a straight tunnel's shape is estimated ([`crate::stages::shape`]). With a
+//! curvature all poses are those in the bent tunnel, and a step of it carries them along
 //! ([`Calibration::carry`]).
 //!
 //! The images do not change if the radius and all positions are scaled together. Poses are
@@ -42,6 +43,8 @@ use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose, so3};
 pub const SHARED_PARAMETERS: usize = 13;
 /// Number of intrinsic parameters of the camera; they come first in κ.
 pub const INTRINSIC_PARAMETERS: usize = 5;
+/// Indices of k1 and k2 in κ.
+const DISTORTION_INDICES: std::ops::Range<usize> = 3..5;
 /// Number of datum parameters ([`Datum`]); they follow the intrinsics in κ.
 pub const DATUM_PARAMETERS: usize = 5;
 /// Index of `ln r` in κ.
@@ -125,6 +128,7 @@ impl Calibration {
                 parameters
                     .get(k)
                     .is_some_and(|(group, _)| groups.contains(group))
+                    && lens_has_parameter(camera, k)
             }),
             tested: [false; SHARED_PARAMETERS],
             middle_h_m: sum / initial.len().max(1) as f64,
@@ -165,6 +169,11 @@ impl Calibration {
     /// True if any shared parameter is estimated.
     pub fn has_free_parameters(&self) -> bool {
         self.free.contains(&true)
+    }
+
+    /// True if the camera's model has the intrinsic parameter `k`.
+    pub fn has_intrinsic(&self, k: usize) -> bool {
+        k < INTRINSIC_PARAMETERS && lens_has_parameter(&self.given, k)
     }
 
     /// True if the equations of a parameter are kept.
@@ -237,6 +246,11 @@ impl Calibration {
         let free = (0..SHARED_PARAMETERS).filter(|k| self.free[*k]);
         free.map(|k| 0.5 * (kappa[k] / self.sigma[k]).powi(2)).sum()
     }
+}
+
+/// True unless the parameter is k1 or k2 and the lens has none.
+fn lens_has_parameter(camera: &Camera, k: usize) -> bool {
+    !DISTORTION_INDICES.contains(&k) || camera.lens.has_k1_k2()
 }
 
 /// The similarity transform from the initial poses' frame to the tunnel.
@@ -317,6 +331,7 @@ impl Datum {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tunnelstitch_geometry::camera::{DoubleSphere, Lens, Mei};
 
     fn calibration() -> Calibration {
         Calibration {
@@ -371,6 +386,32 @@ mod tests {
         let wide = calibration.widen_jitter(&jitter, 0.4);
         assert!((wide.translation_sigma_m[1] - 0.005).abs() < 1e-12);
         assert_eq!(wide.rotation_sigma_rad, 0.03);
+    }
+
+    #[test]
+    fn only_what_the_lens_has_is_estimated() {
+        let groups = CalibrationGroup::ALL;
+        let free = |lens: Lens| {
+            let camera = Camera {
+                lens,
+                ..Camera::from_vertical_fov(160, 120, 1.0)
+            };
+            let section = CalibrateSection::default();
+            let calibration = Calibration::new(&groups, &section, &camera, &[]);
+            let mut kappa = Kappa::zeros();
+            (kappa[0], kappa[3]) = (0.01, 0.1);
+            let moved = calibration.camera(&kappa).unwrap();
+            assert_eq!(moved.lens == lens, !lens.has_k1_k2());
+            assert!((moved.fx / camera.fx - 0.01f64.exp()).abs() < 1e-12);
+            calibration.free
+        };
+        let double_sphere = Lens::DoubleSphere(DoubleSphere::new(-0.2, 0.6).unwrap());
+        let mei = Lens::Mei(Mei::new(0.9, [-0.1, 0.01], [0.0; 2]).unwrap());
+        let mut expected = [true; SHARED_PARAMETERS];
+        expected[READOUT_INDEX..].fill(false);
+        assert_eq!(free(mei), expected);
+        expected[DISTORTION_INDICES].fill(false);
+        assert_eq!(free(double_sphere), expected);
     }
 
     #[test]

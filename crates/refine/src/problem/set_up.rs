@@ -122,5 +122,5 @@ pub fn pixel_size_on_wall<'p>(
         .collect();
     ranges.sort_unstable_by(f64::total_cmp);
     let median = ranges.get(ranges.len() / 2);
-    median.copied().unwrap_or_else(|| mean_radius_m(surface)) / camera.fy
+    median.copied().unwrap_or_else(|| mean_radius_m(surface)) / camera.vertical_focal_px()
 }

@@ -56,7 +56,7 @@ impl PhotometricProblem<'_> {
                     motion += lens_jacobian(pose, &a, &self.context.camera, &x_c) * intrinsics
                         + bend_jacobian(pose, &straightened, &a, &x_c) * curvature;
                 }
-                Some(motion.norm() * self.camera.fy / hit.range)
+                Some(motion.norm() * self.camera.vertical_focal_px() / hit.range)
             })
             .fold(0.0, f64::max)
     }

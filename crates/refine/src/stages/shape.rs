@@ -3,7 +3,6 @@
 
 use crate::model::problem_error::ProblemError;
 use crate::model::significance::chi_squared_bounds;
-use crate::options::RefineOptions;
 use crate::parameters::calibration::{
     BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa, SHARED_PARAMETERS,
 };
@@ -55,7 +54,9 @@ pub fn begin(setup: &Setup, state: &mut PipelineState) -> Result<(), ProblemErro
         Some(wall) => wall.start(model),
         None => Shape::nominal(model),
     });
-    state.free[..INTRINSIC_PARAMETERS].fill(true);
+    for k in LENS.filter(|k| setup.calibration.has_intrinsic(*k)) {
+        state.free[k] = true;
+    }
     state.free[BEND].fill(setup.may_bend());
     Ok(())
 }
@@ -112,8 +113,12 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_l
         return false;
     };
     let kappa = solution.linearised_at.kappa;
-    let is_lens_changed = is_changed::<INTRINSIC_PARAMETERS>(&learned, &kappa, LENS, setup.options);
-    let is_bent = is_changed::<BEND_PARAMETERS>(&learned, &kappa, BEND, setup.options);
+    let of_lens = LENS.filter(|k| setup.calibration.has_intrinsic(*k)).count();
+    let alarm_rate = setup.options.false_alarm_rate;
+    let is_lens_changed =
+        is_changed::<INTRINSIC_PARAMETERS>(&learned, &kappa, (LENS, of_lens), alarm_rate);
+    let is_bent =
+        is_changed::<BEND_PARAMETERS>(&learned, &kappa, (BEND, BEND_PARAMETERS), alarm_rate);
     let has_equations = |k: usize| state.free[k] || state.tested[k];
     let free = std::array::from_fn(|k| match k {
         _ if LENS.contains(&k) && is_lens_changed => has_equations(k),
@@ -150,14 +155,14 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_l
     true
 }
 
-/// True if the N shared parameters `which` differ from the given ones by more than chance:
-/// `κᵀ Σ⁻¹ κ`, Σ their covariance, is a χ² variable if they do not. `kappa`: those where the
-/// equations are.
+/// True if the N shared parameters `which`, of which `count` exist, differ from the given ones by
+/// more than chance: `κᵀ Σ⁻¹ κ`, Σ their covariance, is a χ² variable if they do not. `kappa`:
+/// those where the equations are.
 fn is_changed<const N: usize>(
     learned: &LearnedShape,
     kappa: &Kappa,
-    which: Range<usize>,
-    options: &RefineOptions,
+    (which, count): (Range<usize>, usize),
+    false_alarm_rate: f64,
 ) -> bool {
     let Some((step, information)) = learned.shared() else {
         return false;
@@ -171,7 +176,7 @@ fn is_changed<const N: usize>(
         return false;
     };
     let square = change.dot(&of_change.solve(&change));
-    let bounds = chi_squared_bounds(2.0 * options.false_alarm_rate, N as f64);
+    let bounds = chi_squared_bounds(2.0 * false_alarm_rate, count as f64);
     bounds.is_some_and(|(_, most)| square > most)
 }
 

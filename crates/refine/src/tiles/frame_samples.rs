@@ -7,7 +7,8 @@ use crate::tiles::interpolation::{Interpolation, cubic_weights};
 use nalgebra::{Matrix2x6, Matrix3, SMatrix, Vector3};
 use tunnelstitch_core::frames::GreyImage;
 use tunnelstitch_core::super_resolve::{self, Reading};
-use tunnelstitch_geometry::camera::{Camera, LensF32, ProjectF32, Sweep};
+use tunnelstitch_geometry::camera::{Camera, LensF32, LensLoop, ProjectF32, Sweep};
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_geometry::surface::{Surface, bend_jacobian, lens_jacobian, wall_jacobian};
 use tunnelstitch_geometry::trajectory::Pose;
 
@@ -150,6 +151,9 @@ impl<'a> SampledFrame<'a> {
             LensF32::Pinhole(lens) => self.sample_through(lens, points, shade, values),
             LensF32::BrownConrady(lens) => self.sample_through(lens, points, shade, values),
             LensF32::KannalaBrandt(lens) => self.sample_through(lens, points, shade, values),
+            LensF32::WideAngle(_) | LensF32::RollingWideAngle(_) => {
+                self.sample_wide_angle(points, shade, values);
+            }
             LensF32::RollingPinhole(lens) => self.sample_through(lens, points, shade, values),
             LensF32::RollingBrownConrady(lens) => self.sample_through(lens, points, shade, values),
             LensF32::RollingKannalaBrandt(lens) => self.sample_through(lens, points, shade, values),
@@ -165,8 +169,55 @@ impl<'a> SampledFrame<'a> {
         shade: f32,
         values: &mut Plane,
     ) {
-        let c: Vector3<f32> = self.pose.to_camera(&points.centre.x_w).cast();
+        let centre = self.centre_in_camera(points);
+        let project = |k: usize| self.project_sample(lens, points, &centre, k);
+        self.sample_projected(project, shade, values);
+    }
+
+    /// Samples through one of the rarer models, whose projection is a loop of its own, so that the
+    /// sampling is compiled once for all of them.
+    fn sample_wide_angle(&self, points: &TilePoints, shade: f32, values: &mut Plane) {
+        let mut projected = [(0.0, 0.0); ZERO.len()];
+        self.lens.run(TileProjection {
+            frame: self,
+            points,
+            projected: &mut projected,
+        });
+        self.sample_projected(|k| projected[k], shade, values);
+    }
+
+    /// The centre of a tile in camera coordinates.
+    #[inline(always)]
+    fn centre_in_camera(&self, points: &TilePoints) -> Vector3<f32> {
+        self.pose.to_camera(&points.centre.x_w).cast()
+    }
+
+    /// Projects sample `k` of a tile, whose centre has the camera coordinates `c`.
+    #[inline(always)]
+    fn project_sample(
+        &self,
+        lens: impl ProjectF32,
+        points: &TilePoints,
+        c: &Vector3<f32>,
+        k: usize,
+    ) -> (f32, f32) {
         let r = &self.r_cw;
+        let (dx, dy, dz) = (points.dx[k], points.dy[k], points.dz[k]);
+        let x = c.x + r[(0, 0)] * dx + r[(0, 1)] * dy + r[(0, 2)] * dz;
+        let y = c.y + r[(1, 0)] * dx + r[(1, 1)] * dy + r[(1, 2)] * dz;
+        let z = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
+        let (p, q, _) = lens.project_f32(x, y, z);
+        (p, q)
+    }
+
+    /// Samples where `project` has a sample at focal length 1.
+    #[inline(always)]
+    fn sample_projected(
+        &self,
+        project: impl Fn(usize) -> (f32, f32),
+        shade: f32,
+        values: &mut Plane,
+    ) {
         let [fx, fy, cx, cy] = self.intrinsics;
         let (width, height) = (self.image.width(), self.image.height());
         // The cubic needs one more pixel on either side.
@@ -179,11 +230,7 @@ impl<'a> SampledFrame<'a> {
         let mut index: Indices = [0; ZERO.len()];
         let (mut fu, mut fv) = (ZERO, ZERO);
         for k in 0..ZERO.len() {
-            let (dx, dy, dz) = (points.dx[k], points.dy[k], points.dz[k]);
-            let x = c.x + r[(0, 0)] * dx + r[(0, 1)] * dy + r[(0, 2)] * dz;
-            let y = c.y + r[(1, 0)] * dx + r[(1, 1)] * dy + r[(1, 2)] * dz;
-            let z = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
-            let (p, q, _) = lens.project_f32(x, y, z);
+            let (p, q) = project(k);
             let (u, v) = (fx * p + cx, fy * q + cy);
             // `max` first: a NaN (a sample behind the camera) becomes the first pixel.
             let x0 = (u - 0.5).max(first).min(last_u) + ROUNDING;
@@ -250,12 +297,34 @@ impl<'a> SampledFrame<'a> {
     }
 }
 
+/// The projection of the samples of a tile.
+struct TileProjection<'a, 'f> {
+    frame: &'a SampledFrame<'f>,
+    points: &'a TilePoints,
+    projected: &'a mut [(f32, f32); ZERO.len()],
+}
+
+impl LensLoop for TileProjection<'_, '_> {
+    fn run(self, lens: impl ProjectF32) {
+        let (frame, points, projected) = (self.frame, self.points, self.projected);
+        let centre = frame.centre_in_camera(points);
+        dispatch_simd(
+            #[inline(always)]
+            || {
+                for (k, projected) in projected.iter_mut().enumerate() {
+                    *projected = frame.project_sample(lens, points, &centre, k);
+                }
+            },
+        );
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::parameters::calibration::{Calibration, INTRINSIC_PARAMETERS, Kappa};
     use crate::tiles::grid::{AREA, SIDE, TileId, WallGrid};
-    use tunnelstitch_geometry::camera::{KannalaBrandt, Lens};
+    use tunnelstitch_geometry::camera::{DoubleSphere, KannalaBrandt, Lens};
     use tunnelstitch_geometry::surface::{Circle, Surface, WallPoint};
     use tunnelstitch_geometry::trajectory::so3;
 
@@ -325,7 +394,12 @@ mod tests {
         let straight = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
         assert_sampled_where_projected(straight);
         let fisheye = KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]);
-        for lens in [Lens::radial(-0.1, 0.02), Lens::KannalaBrandt(fisheye)] {
+        let wide = DoubleSphere::new(-0.2, 0.6).unwrap();
+        for lens in [
+            Lens::radial(-0.1, 0.02),
+            Lens::KannalaBrandt(fisheye),
+            Lens::DoubleSphere(wide),
+        ] {
             let camera = Camera { lens, ..straight };
             assert_sampled_where_projected(camera);
             assert_sampled_where_projected(camera.with_sweep(&Sweep {

@@ -78,8 +78,7 @@ impl AlternatingCalibration {
             let context = context.at(states.kappa);
             let observed = correct_until_settled(&context, options, &mut states)?;
             let after = context.frames.shading();
-            let change =
-                after.map_or(0.0, |after| after.relative_difference(&before, observed));
+            let change = after.map_or(0.0, |after| after.relative_difference(&before, observed));
             if change < MAX_SHADING_CHANGE {
                 break;
             }

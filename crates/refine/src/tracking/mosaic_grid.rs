@@ -68,5 +68,5 @@ impl MosaicGrid {
 pub fn pixel_size_m(context: &EstimationContext, camera: &Camera, pose: &Pose) -> f64 {
     let surface = context.surface.as_ref();
     let distance_m = viewing_distance(surface, camera, pose);
-    distance_m.unwrap_or_else(|_| mean_radius_m(surface)) / camera.fy
+    distance_m.unwrap_or_else(|_| mean_radius_m(surface)) / camera.vertical_focal_px()
 }

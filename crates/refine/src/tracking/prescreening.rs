@@ -82,8 +82,14 @@ pub fn prescreen(
     // lens's field of view there is nothing.
     let camera = context.camera.at_level(coarsest);
     let mean = sums.iter().enumerate().map(|(k, [sum, n])| {
-        let is_shown = camera.ray((k % size.0) as f64, (k / size.0) as f64).is_some();
-        if is_shown { (100.0 * sum / n) as f32 } else { f32::NAN }
+        let is_shown = camera
+            .ray((k % size.0) as f64, (k / size.0) as f64)
+            .is_some();
+        if is_shown {
+            (100.0 * sum / n) as f32
+        } else {
+            f32::NAN
+        }
     });
     let mean = GreyImage::new(size.0, size.1, mean.collect());
     let full = (
@@ -136,5 +142,5 @@ fn has_moved(context: &EstimationContext, a: usize, b: usize, coarsest: usize) -
     };
     let rotation = from.r_wc.angle_to(&to.r_wc);
     let translation = (to.t_wc - from.t_wc).norm() / distance_m;
-    (rotation + translation) * context.camera.fy > 2f64.powi(coarsest as i32)
+    (rotation + translation) * context.camera.vertical_focal_px() > 2f64.powi(coarsest as i32)
 }

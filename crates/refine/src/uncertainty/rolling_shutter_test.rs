@@ -118,7 +118,8 @@ fn free_readout(context: &EstimationContext) -> Calibration {
     let mut calibration = context.calibration.intrinsics_only();
     let section = CalibrateSection::default();
     let intrinsics = Calibration::new(&[Focal, Centre, Distortion], &section, &context.camera, &[]);
-    for k in (0..INTRINSIC_PARAMETERS).filter(|k| !context.calibration.free[*k]) {
+    let is_held = |k: &usize| intrinsics.free[*k] && !context.calibration.free[*k];
+    for k in (0..INTRINSIC_PARAMETERS).filter(is_held) {
         (calibration.free[k], calibration.sigma[k]) = (true, intrinsics.sigma[k]);
     }
     let may_bend = context.gauge().shift;

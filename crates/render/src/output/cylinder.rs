@@ -72,22 +72,29 @@ fn covered(image: &DynamicImage) -> [u32; 4] {
     }
 }
 
+/// Focal lengths on the axis along u and v, pixels: the radius of the cylinder.
+fn focal_lengths(camera: &Camera) -> [f64; 2] {
+    [camera.fx, camera.fy].map(|focal_px| focal_px * camera.lens.axis_scale())
+}
+
 /// Maps a pixel of the photo to the unrolled cylinder; `None` where the lens shows nothing.
 pub fn to_cylinder(camera: &Camera, u: f64, v: f64) -> Option<[f64; 2]> {
     let ray = camera.ray(u, v)?;
     let theta = ray.x.atan2(ray.z);
     let h = ray.y / ray.x.hypot(ray.z);
-    Some([camera.fx * theta + camera.cx, camera.fy * h + camera.cy])
+    let [fx, fy] = focal_lengths(camera);
+    Some([fx * theta + camera.cx, fy * h + camera.cy])
 }
 
 /// Maps a pixel of the unrolled cylinder to the photo; `None` where the lens shows nothing, behind
 /// a pinhole for one.
 pub fn from_cylinder(camera: &Camera, u_hat: f64, v_hat: f64) -> Option<[f64; 2]> {
-    let theta = (u_hat - camera.cx) / camera.fx;
+    let [fx, fy] = focal_lengths(camera);
+    let theta = (u_hat - camera.cx) / fx;
     if theta.abs() >= std::f64::consts::PI {
         return None;
     }
-    let h = (v_hat - camera.cy) / camera.fy;
+    let h = (v_hat - camera.cy) / fy;
     let (sin, cos) = theta.sin_cos();
     let pixel = camera.project(&nalgebra::Vector3::new(sin, h, cos))?;
     Some([pixel.x, pixel.y])

@@ -8,7 +8,7 @@ use crate::warp::control_points::ControlPoints;
 use crate::warp::local_polynomial::{LocalPolynomialWarp, ProjectedControlPoints};
 use crate::warp::patches::PATCH_EDGE;
 use crate::warp::projection::{LocalPoints, LocalProjection};
-use tunnelstitch_geometry::camera::{Camera, KannalaBrandt, Lens, Sweep};
+use tunnelstitch_geometry::camera::{Camera, DoubleSphere, KannalaBrandt, Lens, Mei, Sweep};
 use tunnelstitch_geometry::surface::Circle;
 use tunnelstitch_geometry::trajectory::{Shutter, spiral};
 
@@ -19,6 +19,8 @@ fn cameras() -> Vec<Camera> {
         Lens::default(),
         Lens::radial(-0.2, 0.03),
         Lens::KannalaBrandt(fisheye),
+        Lens::DoubleSphere(DoubleSphere::new(-0.2, 0.6).unwrap()),
+        Lens::Mei(Mei::new(0.4, [-0.1, 0.02], [1e-3, -2e-3]).unwrap()),
     ];
     let rest = lenses.map(|lens| Camera { lens, ..plain });
     let sweep = Sweep {

@@ -1,7 +1,7 @@
 //! Projection of wall points into a frame, in single precision.
 
 use nalgebra::{Matrix3, Vector3};
-use tunnelstitch_geometry::camera::{Camera, LensF32, ProjectF32};
+use tunnelstitch_geometry::camera::{Camera, LensF32, LensLoop, ProjectF32};
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_geometry::trajectory::Pose;
 
@@ -93,20 +93,12 @@ impl LocalProjection {
     /// Projects the points from index `start` on, as many as `u`, `v` and `shown` hold; `shown`: by
     /// the lens, within the picture or not.
     pub fn project_all(&self, points: &LocalPoints, start: usize, (u, v, shown): ProjectedPixels) {
-        match self.lens {
-            LensF32::Pinhole(lens) => self.project_through(lens, points, start, u, v, shown),
-            LensF32::BrownConrady(lens) => self.project_through(lens, points, start, u, v, shown),
-            LensF32::KannalaBrandt(lens) => self.project_through(lens, points, start, u, v, shown),
-            LensF32::RollingPinhole(lens) => {
-                self.project_through(lens, points, start, u, v, shown);
-            }
-            LensF32::RollingBrownConrady(lens) => {
-                self.project_through(lens, points, start, u, v, shown);
-            }
-            LensF32::RollingKannalaBrandt(lens) => {
-                self.project_through(lens, points, start, u, v, shown);
-            }
-        }
+        self.lens.run(ProjectionLoop {
+            projection: self,
+            points,
+            start,
+            pixels: (u, v, shown),
+        });
     }
 
     fn project_through(
@@ -146,5 +138,21 @@ impl LocalProjection {
         let u = self.focal[0] * p + self.principal[0];
         let v = self.focal[1] * q + self.principal[1];
         (u, v, shown)
+    }
+}
+
+/// The loop of [`LocalProjection::project_all`].
+struct ProjectionLoop<'a> {
+    projection: &'a LocalProjection,
+    points: &'a LocalPoints,
+    start: usize,
+    pixels: ProjectedPixels<'a>,
+}
+
+impl LensLoop for ProjectionLoop<'_> {
+    fn run(self, lens: impl ProjectF32) {
+        let (u, v, shown) = self.pixels;
+        let projection = self.projection;
+        projection.project_through(lens, self.points, self.start, u, v, shown);
     }
 }

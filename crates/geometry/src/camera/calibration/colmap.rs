@@ -1,6 +1,6 @@
 //! COLMAP's `cameras.txt`.
 
-use super::coefficients::{brown_conrady, kannala_brandt};
+use super::coefficients::{brown_conrady, eucm, fov, kannala_brandt, thin_prism_fisheye};
 use super::error::ParseError;
 use super::selection::select_camera;
 use crate::camera::lens::Lens;
@@ -10,13 +10,28 @@ use crate::camera::sweep::Sweep;
 /// Creates a lens from its coefficients.
 type ReadLens = fn(&[f64]) -> Result<Lens, ParseError>;
 
+/// The cameras' lines with their numbers from 1.
+fn camera_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let lines = text.lines().enumerate();
+    lines
+        .map(|(k, line)| (k + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+/// True for a file with lines of which none has a name where a camera has its model.
+pub fn has_no_model(text: &str) -> bool {
+    let has_name = |line: &str| {
+        let second = line.split_whitespace().nth(1).unwrap_or_default();
+        second.starts_with(|first: char| first.is_ascii_alphabetic())
+    };
+    let mut lines = camera_lines(text).peekable();
+    lines.peek().is_some() && !lines.any(|(_, line)| has_name(line))
+}
+
 /// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixel coordinates are counted from the corner of
 /// the first pixel and converted.
 pub fn read(text: &str, name: Option<&str>) -> Result<Camera, ParseError> {
-    let lines = text.lines().enumerate();
-    let cameras: Vec<_> = lines
-        .map(|(k, line)| (k + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+    let cameras: Vec<_> = camera_lines(text)
         .map(|(number, line)| {
             let id = line
                 .split_whitespace()
@@ -59,13 +74,15 @@ fn camera(line: &str) -> Result<Camera, String> {
         "SIMPLE_RADIAL_FISHEYE" => (3, 1, kannala_brandt),
         "RADIAL_FISHEYE" => (3, 2, kannala_brandt),
         "OPENCV_FISHEYE" => (4, 4, kannala_brandt),
+        "THIN_PRISM_FISHEYE" => (4, 8, thin_prism_fisheye),
+        "FOV" => (4, 1, fov),
+        "EUCM" => (4, 2, eucm),
         _ => {
             return Err(format!(
                 "the camera model {model} is not supported; known are SIMPLE_PINHOLE, PINHOLE, \
-                 SIMPLE_RADIAL, RADIAL, OPENCV, \
-                 FULL_OPENCV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE (`colmap \
-                 model_converter` and \
-                 `colmap image_undistorter` make one)"
+                 SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, SIMPLE_RADIAL_FISHEYE, \
+                 RADIAL_FISHEYE, OPENCV_FISHEYE, THIN_PRISM_FISHEYE, FOV and EUCM (`colmap \
+                 model_converter` and `colmap image_undistorter` make one)"
             ));
         }
     };

@@ -1,5 +1,6 @@
 //! Errors of calibration files.
 
+use crate::camera::lens_error::LensParameterError;
 use std::path::PathBuf;
 
 /// An error of a calibration file.
@@ -50,5 +51,11 @@ impl ParseError {
             line: Some(line),
             what: what.into(),
         }
+    }
+}
+
+impl From<LensParameterError> for ParseError {
+    fn from(error: LensParameterError) -> Self {
+        Self::new(error.to_string())
     }
 }

@@ -1,27 +1,38 @@
 //! Calibration files: the program's own format (JSON or TOML), OpenCV's YAML, ROS's camera_info,
-//! Kalibr's camchain, COLMAP's cameras.txt and nerfstudio's transforms.json.
+//! Kalibr's camchain, the YAML of camodocal and VINS-Fusion, COLMAP's cameras.txt, nerfstudio's
+//! transforms.json, Basalt's JSON and OCamCalib's calib_results.txt.
 //!
 //! | file | recognised by | lens | centre of the first pixel |
 //! | --- | --- | --- | --- |
 //! | own | `.json`, `.toml` | [`native`] | `pixel_centre` |
 //! | OpenCV | `.yaml`, `.yml`; a matrix with `rows`, `cols`, `data` named `camera_matrix` or similar | 4, 5 or 8 coefficients; fisheye if `fisheye_model: 1` | (0, 0) |
 //! | ROS | as OpenCV, with `distortion_model` | `plumb_bob`, `rational_polynomial`, `equidistant` | (0, 0) |
-//! | Kalibr | `.yaml` with `cam0:` | `radtan`, `equidistant`, `none` | (0, 0) |
-//! | COLMAP | `.txt` | PINHOLE … FULL_OPENCV, the fisheyes | (½, ½) |
+//! | Kalibr | `.yaml` with `cam0:` | pinhole with `radtan`, `equidistant`, `fov`, `none`; `omni` with `radtan`, `none`; `ds`; `eucm` | (0, 0) |
+//! | camodocal | `.yaml` with `model_type` | `PINHOLE`, `MEI`, `KANNALA_BRANDT` | (0, 0) |
+//! | COLMAP | `.txt` | PINHOLE … FULL_OPENCV, the fisheyes, THIN_PRISM_FISHEYE, FOV, EUCM | (½, ½) |
+//! | OCamCalib | `.txt` with five lines of numbers | polynomial | (0, 0) |
+//! | Basalt | `.json` with `value0` | `pinhole`, `ds`, `eucm`, `ucm`, `kb4`, `fov` | (0, 0) |
 //! | nerfstudio | `.json` with `fl_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
 
+mod basalt;
+mod camodocal;
 mod coefficients;
 mod colmap;
 mod error;
 mod kalibr;
+mod lens_keys;
 mod native;
 mod nerfstudio;
+mod ocamcalib;
 mod opencv;
 mod read;
 mod selection;
 #[cfg(test)]
 mod tests;
+mod unknown;
 mod value_tree;
+#[cfg(test)]
+mod wide_angle_tests;
 
 pub use error::CalibrationError;
 pub use native::format_calibration;

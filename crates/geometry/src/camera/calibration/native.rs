@@ -1,22 +1,11 @@
 //! The program's own calibration format, `camera.json` or `camera.toml`.
 
 use super::error::ParseError;
-use crate::camera::brown_conrady::{BrownCoefficients, BrownConrady};
-use crate::camera::kannala_brandt::KannalaBrandt;
-use crate::camera::lens::Lens;
+use super::lens_keys::{LensKeys, Model};
 use crate::camera::projection::Camera;
 use crate::camera::sweep::Sweep;
 use serde::{Deserialize, Serialize, Serializer};
-
-#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Model {
-    /// Pinhole; coefficients of [`Model::BrownConrady`] are accepted.
-    Pinhole,
-    BrownConrady,
-    #[serde(alias = "fisheye", alias = "equidistant")]
-    KannalaBrandt,
-}
+use serde_json::Value;
 
 #[derive(Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -28,10 +17,10 @@ enum PixelCentre {
     Half,
 }
 
-/// A calibration file: `model` ("pinhole", "brown-conrady" or "kannala-brandt"), `width`, `height`,
-/// `fx`, `fy`, `cx`, `cy` in pixels; the coefficients k1 to k6, p1, p2 of a [`BrownConrady`] or k1
-/// to k4 of a [`KannalaBrandt`], 0 if missing; `max_angle_deg`, the largest angle off the axis to
-/// be used (no limit if missing); and `pixel_centre` ("integer", the default, or "half").
+/// A calibration file: `model` ([`Model`]), `width`, `height`, `fx`, `fy`, `cx`, `cy` in pixels;
+/// the parameters of the lens ([`LensKeys`]), of which coefficients are 0 if missing;
+/// `max_angle_deg`, the largest angle off the axis to be used (no limit if missing); and
+/// `pixel_centre` ("integer", the default, or "half").
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraFile {
@@ -58,6 +47,26 @@ pub struct CameraFile {
     k5: f64,
     #[serde(default, skip_serializing_if = "is_zero")]
     k6: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    sx1: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    sy1: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    xi: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    alpha: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    beta: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    omega: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    polynomial: Option<Vec<f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    c: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    d: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    e: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     max_angle_deg: Option<f64>,
     #[serde(default)]
@@ -66,6 +75,12 @@ pub struct CameraFile {
 
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
+}
+
+/// True for an object with one of the keys that every camera has.
+pub fn is_native(tree: &Value) -> bool {
+    let keys = ["model", "width", "height", "fx", "fy", "cx", "cy"];
+    keys.iter().any(|key| tree.get(key).is_some())
 }
 
 /// Reads the file as JSON.
@@ -102,36 +117,18 @@ impl Serialize for Camera {
 impl CameraFile {
     /// Converts a camera to its file.
     pub fn of(camera: &Camera) -> Self {
-        let (model, k, [p1, p2], max_angle_rad, all_rad) = match &camera.lens {
-            Lens::BrownConrady(lens) => {
-                let BrownCoefficients { k, p } = *lens.coefficients();
-                let model = if lens.is_distortion_free() {
-                    Model::Pinhole
-                } else {
-                    Model::BrownConrady
-                };
-                (
-                    model,
-                    k,
-                    p,
-                    lens.max_angle_rad(),
-                    std::f64::consts::FRAC_PI_2,
-                )
-            }
-            Lens::KannalaBrandt(lens) => {
-                let [k1, k2, k3, k4] = *lens.coefficients();
-                let k = [k1, k2, k3, k4, 0.0, 0.0];
-                let max_angle_rad = lens.max_angle_rad();
-                (
-                    Model::KannalaBrandt,
-                    k,
-                    [0.0; 2],
-                    max_angle_rad,
-                    std::f64::consts::PI,
-                )
-            }
-        };
-        let [k1, k2, k3, k4, k5, k6] = k;
+        let LensKeys {
+            model,
+            k: [k1, k2, k3, k4, k5, k6],
+            p: [p1, p2],
+            s: [sx1, sy1],
+            xi,
+            alpha,
+            beta,
+            omega,
+            polynomial,
+            affine: [c, d, e],
+        } = LensKeys::of(&camera.lens);
         Self {
             model,
             width: camera.width,
@@ -148,27 +145,35 @@ impl CameraFile {
             k4,
             k5,
             k6,
-            max_angle_deg: (max_angle_rad < all_rad).then(|| max_angle_rad.to_degrees()),
+            sx1,
+            sy1,
+            xi,
+            alpha,
+            beta,
+            omega,
+            polynomial,
+            c,
+            d,
+            e,
+            max_angle_deg: camera.lens.max_angle_rad().map(f64::to_degrees),
             pixel_centre: PixelCentre::Integer,
         }
     }
 
     fn camera(&self) -> Result<Camera, ParseError> {
-        let coefficients = [
-            ("k1", self.k1),
-            ("k2", self.k2),
-            ("p1", self.p1),
-            ("p2", self.p2),
-            ("k3", self.k3),
-            ("k4", self.k4),
-            ("k5", self.k5),
-            ("k6", self.k6),
-        ];
-        if let Some((name, value)) = coefficients.iter().find(|(_, value)| !value.is_finite()) {
-            return Err(ParseError::new(format!(
-                "{name} is {value}; it must be a number"
-            )));
+        let lens = LensKeys {
+            model: self.model,
+            k: [self.k1, self.k2, self.k3, self.k4, self.k5, self.k6],
+            p: [self.p1, self.p2],
+            s: [self.sx1, self.sy1],
+            xi: self.xi,
+            alpha: self.alpha,
+            beta: self.beta,
+            omega: self.omega,
+            polynomial: self.polynomial.clone(),
+            affine: [self.c, self.d, self.e],
         }
+        .lens()?;
         let max_angle_rad = match self.max_angle_deg {
             None => f64::INFINITY,
             Some(deg) if deg > 0.0 && deg <= 180.0 => deg.to_radians(),
@@ -178,23 +183,6 @@ impl CameraFile {
                      to 180"
                 )));
             }
-        };
-        let lens = if self.model == Model::KannalaBrandt {
-            let foreign = ["p1", "p2", "k5", "k6"];
-            let foreign = |(name, value): &&(&str, f64)| foreign.contains(name) && *value != 0.0;
-            if let Some((name, _)) = coefficients.iter().find(foreign) {
-                return Err(ParseError::new(format!(
-                    "a kannala-brandt lens has k1 to k4 only, not {name}"
-                )));
-            }
-            let lens = KannalaBrandt::new([self.k1, self.k2, self.k3, self.k4]);
-            Lens::KannalaBrandt(lens.limited_to(max_angle_rad))
-        } else {
-            let lens = BrownConrady::new(BrownCoefficients {
-                k: [self.k1, self.k2, self.k3, self.k4, self.k5, self.k6],
-                p: [self.p1, self.p2],
-            });
-            Lens::BrownConrady(lens.limited_to(max_angle_rad))
         };
         let shift = match self.pixel_centre {
             PixelCentre::Integer => 0.0,
@@ -207,7 +195,7 @@ impl CameraFile {
             fy: self.fy,
             cx: self.cx - shift,
             cy: self.cy - shift,
-            lens,
+            lens: lens.limited_to(max_angle_rad),
             sweep: Sweep::default(),
             max_range_m: f64::INFINITY,
         })

@@ -2,6 +2,7 @@
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;
+use super::unknown::unknown_calibration;
 use super::value_tree::{entry, numbers, pixels, text_entry};
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
@@ -34,11 +35,8 @@ const HEIGHT: [&str; 3] = ["image_height", "height", "image_Height"];
 /// ROS names the lens model in `distortion_model`; OpenCV's files hold a fisheye if `fisheye_model`
 /// is 1.
 pub fn read(tree: &Value) -> Result<Camera, ParseError> {
-    let matrix = entry(tree, &MATRIX).ok_or_else(|| {
-        ParseError::new(
-            "no `camera_matrix`: this is not a known calibration file of OpenCV, ROS or Kalibr",
-        )
-    })?;
+    let matrix = entry(tree, &MATRIX)
+        .ok_or_else(|| unknown_calibration(" (no `camera_matrix`, `cam0` or `model_type`)"))?;
     let k = numbers(matrix, "camera_matrix")?;
     let [fx, skew, cx, _, fy, cy, ..] = k[..] else {
         return Err(ParseError::new(format!(

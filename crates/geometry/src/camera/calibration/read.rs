@@ -1,7 +1,8 @@
 //! Reading and validation of calibration files.
 
 use super::error::{CalibrationError, ParseError};
-use super::{colmap, kalibr, native, nerfstudio, opencv, value_tree};
+use super::unknown::unknown_calibration;
+use super::{basalt, camodocal, colmap, kalibr, native, nerfstudio, ocamcalib, opencv, value_tree};
 use crate::camera::projection::Camera;
 use std::path::Path;
 
@@ -47,10 +48,14 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
             let tree = value_tree::parse_yaml(text)?;
             if kalibr::is_camchain(&tree) {
                 kalibr::read(&tree, name)
+            } else if camodocal::is_camodocal(&tree) {
+                camodocal::read(&tree)
             } else {
                 opencv::read(&tree)
             }
         }
+        "txt" if ocamcalib::is_ocamcalib(text) => ocamcalib::read(text),
+        "txt" if colmap::has_no_model(text) => Err(unknown_calibration("")),
         "txt" => colmap::read(text, name),
         "toml" => native::read_toml(text),
         "xml" => Err(ParseError::new(
@@ -59,6 +64,8 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
         )),
         _ => match value_tree::parse_json(text) {
             Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
+            Ok(tree) if basalt::is_basalt(&tree) => basalt::read(&tree, name),
+            Ok(tree) if !native::is_native(&tree) => Err(unknown_calibration("")),
             _ => native::read_json(text),
         },
     }

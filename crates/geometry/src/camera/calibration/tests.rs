@@ -260,7 +260,7 @@ fn bad_files_say_where_and_what() {
         (
             "c.json",
             own(r#","p1":0.1"#).replace("pinhole", "kannala-brandt"),
-            "k1 to k4 only",
+            "k1 to k4 only, not p1",
         ),
         ("c.json", "not json".to_owned(), "c.json:1: expected"),
         (
@@ -298,8 +298,8 @@ fn bad_files_say_where_and_what() {
         ("c.yml", "a: 1\n".to_owned(), "no `camera_matrix`"),
         (
             "c.yml",
-            "cam0: {camera_model: omni}\n".to_owned(),
-            "\"omni\" is not supported",
+            "cam0: {camera_model: bal}\n".to_owned(),
+            "\"bal\" is not supported",
         ),
         (
             "c.xml",
@@ -314,8 +314,8 @@ fn bad_files_say_where_and_what() {
         ),
         (
             "c.txt",
-            "1 FOV 640 480 415 417 318 241 1\n".to_owned(),
-            "FOV is not supported",
+            "1 FULL_FOV 640 480 415 417 318 241 1\n".to_owned(),
+            "FULL_FOV is not supported",
         ),
         (
             "c.txt",
