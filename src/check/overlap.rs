@@ -32,8 +32,8 @@ pub struct OverlapCheck {
     /// Shorter side of the rectangle on the unrolled wall that neighbours share, masked parts
     /// included, metres.
     pub neighbours_width_m: f64,
-    /// Number of frames that look along the tunnel's axis and are not measured.
-    pub along_the_axis: usize,
+    /// Number of frames that show no wall within range and are not measured.
+    pub without_wall: usize,
 }
 
 /// Sides of the rectangle that two footprints share, metres.
@@ -139,7 +139,7 @@ impl OverlapCheck {
             least_after: least.map_or(0, |(k, _)| k),
             turns: median_or_zero((0..poses.len()).step_by(step).map(others)),
             neighbours_width_m: median_or_zero(widths.map(|[s, h]| s.min(h))),
-            along_the_axis: footprints.iter().filter(|f| f.is_none()).count(),
+            without_wall: footprints.iter().filter(|f| f.is_none()).count(),
         }
     }
 }

@@ -18,7 +18,7 @@ const MAX_REGISTRATION_SIGMA_PX: f64 = 0.1;
 pub(super) fn warnings(check: &Check) -> Vec<String> {
     let all = [
         weak_overlap(check),
-        frames_along_the_axis(check),
+        frames_without_wall(check),
         open_turns(check),
         large_jitter(check),
         dark_frames(check),
@@ -47,12 +47,12 @@ fn weak_overlap(check: &Check) -> Option<String> {
     })
 }
 
-fn frames_along_the_axis(check: &Check) -> Option<String> {
-    let count = check.overlap.along_the_axis;
+fn frames_without_wall(check: &Check) -> Option<String> {
+    let count = check.overlap.without_wall;
     (count > 0).then(|| {
         format!(
-            "{count} frames look along the tunnel's axis according to the initial poses; check \
-             camera_axes and tunnel_frame, or remove these frames"
+            "{count} frames show no wall within camera.max_range_m according to the initial poses; \
+             give a longer range, or remove these frames"
         )
     })
 }

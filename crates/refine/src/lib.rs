@@ -84,7 +84,7 @@ mod verdict;
 pub use error::RefineError;
 pub use input::RefineInput;
 pub use model::problem_error::ProblemError;
-pub use options::{RefineOptions, ShapeMode};
+pub use options::{Photometry, RefineOptions, ShapeMode};
 pub use pipeline::{refine, refine_with_checkpoint};
 pub use point_fit::points_report::{PointsAxis, PointsReport, PointsSection};
 pub use points::error::PointsFitError;

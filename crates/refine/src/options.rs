@@ -14,6 +14,19 @@ pub enum ShapeMode {
     Fixed,
 }
 
+/// Treatment of the light in the frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Photometry {
+    /// By the model, or, where the light defies it, by local normalisation.
+    #[default]
+    Auto,
+    /// By the model: gain and bias of every frame, and a shading that all have in common.
+    Model,
+    /// By local normalisation ([`tunnelstitch_core::frames::normalise_locally`]).
+    Normalised,
+}
+
 /// Options of a refinement. The defaults suit most surveys; the noise model of the poses comes with
 /// the input.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -23,6 +36,8 @@ pub struct RefineOptions {
     pub calibrate: Option<Vec<CalibrationGroup>>,
     /// Treatment of the wall's shape.
     pub shape: ShapeMode,
+    /// Treatment of the light.
+    pub photometry: Photometry,
     /// 1-σ of the logarithm of a frame's gain around 0 (0.3 is about ±30 %).
     pub log_gain_sigma: f64,
     /// 1-σ of a frame's bias around 0, grey levels.
@@ -73,6 +88,7 @@ impl Default for RefineOptions {
         Self {
             calibrate: None,
             shape: ShapeMode::Estimated,
+            photometry: Photometry::Auto,
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
             coarsest_side: 30,

@@ -4,17 +4,19 @@ use crate::error::RefineError;
 use crate::input::RefineInput;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
-use crate::options::RefineOptions;
+use crate::model::rejection::RejectionReason;
+use crate::options::{Photometry, RefineOptions};
 use crate::parameters::calibration::Kappa;
 use crate::parameters::unseen_errors::UnseenErrors;
 use crate::refined::Refined;
 use crate::stages::assess::without_solution;
-use crate::stages::plan::plan_stages;
+use crate::stages::plan::{Stage, plan_stages};
 use crate::stages::run::run_stage;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::{Estimation, PipelineState};
 use std::sync::Arc;
+use tunnelstitch_core::frames::Light;
 use tunnelstitch_core::persist::checkpoint::Checkpoint;
 use tunnelstitch_core::progress::Progress;
 
@@ -50,27 +52,59 @@ pub fn refine_with_checkpoint<'a>(
     let setup = Setup::new(input.into(), options)?;
     let mut session = Session::new(checkpoint, progress);
     let state = session.restore(&setup)?;
-    let mut estimation = Estimation {
-        state: state.unwrap_or_else(|| begin(&setup)),
-        solution: None,
-        refined: None,
-    };
+    if options.photometry == Photometry::Normalised {
+        setup.frames.set_light(Light::Normalised);
+    }
+    let mut estimation = Estimation::new(state.unwrap_or_else(|| begin(&setup)));
     while let Some(stage) = estimation.state.stages.front().copied() {
         // The solution that the assessment uses is no part of a snapshot.
         if estimation.solution.is_none() {
             session.keep_if_due(&setup, || estimation.state.clone())?;
         }
-        estimation = match run_stage(stage, &setup, estimation, &mut session) {
-            Ok(estimation) => estimation,
-            // Poses that nothing determines are those given.
-            Err(RefineError::Problem(ProblemError::Factor { .. })) => {
-                return Ok(without_solution(&setup, &mut session));
-            }
+        let ended = match run_stage(stage, &setup, estimation, &mut session) {
+            Ok(estimation) => Some(estimation),
+            Err(RefineError::Problem(ProblemError::Factor { .. })) => None,
             Err(error) => return Err(error),
         };
-        estimation.state.stages.pop_front();
+        let fits = ended.as_ref().is_some_and(|ended| fits_light(stage, ended));
+        estimation = match ended {
+            _ if !fits && may_normalise(&setup) => {
+                setup.frames.set_light(Light::Normalised);
+                Estimation::new(begin(&setup))
+            }
+            Some(ended) => ended.without_first_stage(),
+            // Poses that nothing determines are those given.
+            None => return Ok(without_solution(&setup, &mut session)),
+        };
     }
     estimation.refined.ok_or(RefineError::NoOverlap)
+}
+
+/// True if local normalisation may take the place of a model of light that does not hold.
+fn may_normalise(setup: &Setup) -> bool {
+    setup.options.photometry == Photometry::Auto
+        && !matches!(setup.frames.light(), Light::Normalised)
+}
+
+/// True if the light of most frames that show something fits the model, as far as the stage that
+/// has ended tells: a shading explains it, they could be registered, or, at the end, are
+/// photometric.
+fn fits_light(stage: Stage, ended: &Estimation) -> bool {
+    if !ended.state.has_common_light {
+        return false;
+    }
+    let rejections = match (stage, &ended.refined) {
+        (_, Some(refined)) => {
+            return refined.report.frames_on_prior * 2 <= refined.report.frames.len();
+        }
+        (Stage::Track, None) => &ended.state.frames.rejections,
+        _ => return true,
+    };
+    let shown = rejections
+        .iter()
+        .filter(|reason| !reason.as_ref().is_some_and(RejectionReason::shows_nothing));
+    let registered = rejections.iter().filter(|reason| reason.is_none()).count();
+    2 * registered >= shown.count()
 }
 
 /// The state before the first stage.
@@ -83,6 +117,7 @@ fn begin(setup: &Setup) -> PipelineState {
     PipelineState {
         stages: plan_stages(setup.options, setup.handover_level()),
         noise: 0.0,
+        has_common_light: true,
         dispersion: 1.0,
         solved: frames.clone(),
         frames,

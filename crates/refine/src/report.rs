@@ -1,5 +1,6 @@
 //! `refine.json`: the report of a refinement.
 
+use crate::options::Photometry;
 use crate::point_fit::points_report::PointsReport;
 use crate::solver::solve_record::SolveRecord;
 use crate::uncertainty::bend_report::BendReport;
@@ -119,6 +120,8 @@ pub struct RefineReport {
     pub frames: Vec<FrameReport>,
     /// Frames whose pose rests on the prior.
     pub frames_on_prior: usize,
+    /// Treatment of the light: by the model, or by local normalisation.
+    pub photometry: Photometry,
     /// The covariance over the inverse of the normal matrix, c of
     /// [`crate::uncertainty::covariance`]: above 1 where residuals err together, below
     /// where they cancel.

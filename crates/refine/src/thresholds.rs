@@ -105,6 +105,13 @@ pub mod alternating_calibration {
     ///
     /// Chosen by: unknown.
     pub const MAX_SHADING_CHANGE: f64 = 0.01;
+
+    /// Ratio of a change of the shading to the smallest before it from which on it does not settle.
+    ///
+    /// Higher: more rounds are made in a light that is no common shading.
+    ///
+    /// Chosen by: a change that is not even halved takes more rounds than there are.
+    pub const MAX_CHANGE_RATIO: f64 = 0.5;
 }
 
 /// Thresholds of `tracking/registration.rs` and `tracking/candidate.rs`.

@@ -6,8 +6,8 @@ use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::persist::atomic;
 use crate::progress::Progress;
 use crate::refine::{
-    CalibrationReport, FrameFlag, FrameReport, ReadoutEstimate, RefineOptions, RefineReport,
-    Refined, ShapeMode, search_pose_conventions,
+    CalibrationReport, FrameFlag, FrameReport, Photometry, ReadoutEstimate, RefineOptions,
+    RefineReport, Refined, ShapeMode, search_pose_conventions,
 };
 use crate::report::{REFINEMENT_FILE, SECTIONS_FILE};
 use crate::survey::{CalibrationGroup, Survey};
@@ -51,6 +51,12 @@ pub struct RefineArguments {
     /// it, as far as the frames show it, and writes shape.json; fixed takes both as given.
     #[arg(long, value_name = "MODE", value_enum, default_value_t = ShapeArgument::Auto)]
     shape: ShapeArgument,
+    /// Light: model estimates gain and bias of every frame and a shading that all have in common;
+    /// normalised compares contrast relative to its surroundings, whatever the light (lamps near
+    /// the wall, sheen, flicker, unknown tone curves), and is a little less exact; auto tries the
+    /// model first, and normalises if less than half of the frames fit it.
+    #[arg(long, value_name = "MODE", value_enum, default_value_t = PhotometryArgument::Auto)]
+    photometry: PhotometryArgument,
     /// Points of the wall that a scanner or a depth camera has measured, in the world of the
     /// initial poses, metres: .ply, .las, .laz, .pcd, or text with x y z in each line. The wall is
     /// fitted to them, robustly: frames refine that shape (with --shape fixed, they take it as it
@@ -111,6 +117,27 @@ impl From<ShapeArgument> for ShapeMode {
         match mode {
             ShapeArgument::Auto => Self::Estimated,
             ShapeArgument::Fixed => Self::Fixed,
+        }
+    }
+}
+
+/// Names of modes for `--photometry`.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum PhotometryArgument {
+    /// By the model, or, where the light defies it, by local normalisation.
+    Auto,
+    /// Gain and bias of every frame, and a common shading.
+    Model,
+    /// By local normalisation.
+    Normalised,
+}
+
+impl From<PhotometryArgument> for Photometry {
+    fn from(mode: PhotometryArgument) -> Self {
+        match mode {
+            PhotometryArgument::Auto => Self::Auto,
+            PhotometryArgument::Model => Self::Model,
+            PhotometryArgument::Normalised => Self::Normalised,
         }
     }
 }
@@ -230,6 +257,7 @@ impl RefineArguments {
                 .map(|list| list.iter().flat_map(|group| group.groups()).collect()),
             joint: self.joint,
             shape: self.shape.into(),
+            photometry: self.photometry.into(),
             ..if self.fast {
                 RefineOptions::fast()
             } else {
@@ -270,6 +298,12 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
         poses.display(),
         arguments.out.join(REFINEMENT_FILE).display()
     ));
+    if report.photometry == Photometry::Normalised {
+        terminal.say(
+            "frames were compared by their contrast, normalised locally: the light is not that of \
+             a model with gain, bias and one shading for all",
+        );
+    }
     if let Some(points) = &report.points {
         terminal.say(points.sentence());
     }

@@ -3,10 +3,12 @@
 use super::error::FrameError;
 use super::frame_file::FrameFile;
 use super::frame_set::FrameSet;
+use super::local_normalisation::normalise_locally;
 use super::mask::PyramidMask;
 use super::pyramid::Pyramid;
 use super::shading::Shading;
 use super::stored_frame::StoredFrame;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use tunnelstitch_geometry::camera::Camera;
@@ -29,7 +31,7 @@ const PYRAMID_BYTES_PER_PIXEL: f64 = 6.0;
 pub struct FrameCache {
     source: Source,
     levels: usize,
-    shading: RwLock<Option<Arc<Shading>>>,
+    light: RwLock<Light>,
     /// Largest number of pyramids.
     room: usize,
     shelf: Mutex<RecentPyramids>,
@@ -40,6 +42,18 @@ pub struct FrameCache {
 enum Source {
     Files(FrameSet, Box<Camera>),
     Memory(Vec<Arc<Pyramid>>),
+}
+
+/// Treatment of the frames' light.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub enum Light {
+    /// As it is.
+    #[default]
+    Even,
+    /// Divided by a shading that all frames have in common.
+    Shaded(Shading),
+    /// Taken off by local normalisation ([`normalise_locally`]).
+    Normalised,
 }
 
 /// The most recently used pyramids.
@@ -75,7 +89,7 @@ impl FrameCache {
         Self {
             source: Source::Files(frames.clone(), Box::new(*camera)),
             levels,
-            shading: RwLock::default(),
+            light: RwLock::default(),
             room: room.max(1),
             shelf: Mutex::default(),
             stored: Mutex::new(StoredFrames {
@@ -91,7 +105,7 @@ impl FrameCache {
         Self {
             source: Source::Memory(pyramids.into_iter().map(Arc::new).collect()),
             levels: 1,
-            shading: RwLock::default(),
+            light: RwLock::default(),
             room: frames,
             shelf: Mutex::default(),
             stored: Mutex::default(),
@@ -122,20 +136,28 @@ impl FrameCache {
         self.room
     }
 
-    /// The shading by which frames are divided.
-    pub fn shading(&self) -> Option<Arc<Shading>> {
-        let shading = self.shading.read();
-        shading.unwrap_or_else(PoisonError::into_inner).clone()
+    /// Treatment of the frames' light.
+    pub fn light(&self) -> Light {
+        let light = self.light.read();
+        light.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Sets the shading by which frames are divided and drops the cached pyramids.
-    pub fn set_shading(&self, shading: Shading) {
-        let mut present = self.shading.write().unwrap_or_else(PoisonError::into_inner);
-        *present = Some(Arc::new(shading));
+    /// The shading by which frames are divided.
+    pub fn shading(&self) -> Option<Shading> {
+        match self.light() {
+            Light::Shaded(shading) => Some(shading),
+            Light::Even | Light::Normalised => None,
+        }
+    }
+
+    /// Sets the treatment of the frames' light and drops the cached pyramids.
+    pub fn set_light(&self, light: Light) {
+        let mut present = self.light.write().unwrap_or_else(PoisonError::into_inner);
+        *present = light;
         lock(&self.shelf).kept.clear();
     }
 
-    /// The pyramid of a frame, divided by the shading; pixels without a value are NaN.
+    /// The pyramid of a frame in the light that is set; pixels without a value are NaN.
     ///
     /// # Errors
     /// The errors of [`StoredFrame::decode`].
@@ -159,8 +181,10 @@ impl FrameCache {
         if let Some(mask) = frames.mask() {
             mask.blank(&mut image);
         }
-        if let Some(shading) = self.shading() {
-            shading.divide(&mut image);
+        match self.light() {
+            Light::Even => {}
+            Light::Shaded(shading) => shading.divide(&mut image),
+            Light::Normalised => image = normalise_locally(&image),
         }
         let pyramid = Arc::new(Pyramid::new(image, self.levels));
         let mut shelf = lock(&self.shelf);

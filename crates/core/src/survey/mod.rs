@@ -17,6 +17,7 @@
 //! [camera]
 //! file = "camera.json"
 //! readout_ms = 20.0           # optional: rolling shutter, from the first row to the last
+//! max_range_m = 18.0          # optional: farther wall is not used; 6 radii by default
 //!
 //! [frames]
 //! images = "frames/*.jpg"     # sorted by name; or

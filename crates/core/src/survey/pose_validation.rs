@@ -1,7 +1,8 @@
 //! Validation of poses against the tunnel, and a search for the convention that was meant.
 //!
-//! A wrong convention places cameras outside, makes them look along the axis, or makes them move
-//! and rotate along another direction. In these cases other conventions are tried, the simplest
+//! A wrong convention places cameras outside, makes them look along the axis while they revolve, or
+//! makes them move and rotate along another direction. (A camera that does not revolve may look
+//! along the axis: the usual one of a sewer robot does.) In these cases other conventions are tried, the simplest
 //! first, and the plausible one is named with its flag. A wrong convention that leaves all cameras
 //! inside and looking at the wall can only be detected from the images
 //! ([`Survey::pose_convention_variants`](crate::survey::Survey::pose_convention_variants)).
@@ -61,7 +62,8 @@ impl PoseSummary {
     }
 
     fn is_wrong(&self) -> bool {
-        self.frames >= MIN_FRAMES && self.share(self.outside) > MAX_WRONG_FRACTION
+        let axial = if self.course.revolves { self.axial } else { 0 };
+        self.frames >= MIN_FRAMES && self.share(self.outside.max(axial)) > MAX_WRONG_FRACTION
     }
 
     fn is_right(&self) -> bool {
@@ -69,7 +71,7 @@ impl PoseSummary {
             direction.is_none_or(|d| d.y.abs() > MAX_ALIGNED_ANGLE_RAD.cos())
         };
         self.outside == 0
-            && self.share(self.axial) <= MAX_AXIAL_FRACTION
+            && (!self.course.revolves || self.share(self.axial) <= MAX_AXIAL_FRACTION)
             && along(&self.course.motion)
             && along(&self.course.turning)
     }
@@ -78,7 +80,7 @@ impl PoseSummary {
     fn is_suspicious(&self) -> bool {
         let askew = |direction: &Option<Vector3<f64>>| direction.is_some_and(|d| is_askew(&d));
         let (motion, turning) = (askew(&self.course.motion), askew(&self.course.turning));
-        let some_axial = self.share(self.axial) > MAX_AXIAL_FRACTION;
+        let some_axial = self.course.revolves && self.share(self.axial) > MAX_AXIAL_FRACTION;
         self.frames >= MIN_FRAMES
             && ((turning && (motion || some_axial)) || (motion && !self.course.turns))
     }
@@ -104,6 +106,8 @@ struct MotionDirections {
     motion: Option<Vector3<f64>>,
     /// True if the cameras rotate.
     turns: bool,
+    /// True if they go on rotating the same way: rolling, or looking around in full turns.
+    revolves: bool,
     /// Axis of the rotation.
     turning: Option<Vector3<f64>>,
     /// Mean of the camera centres, metres.
@@ -116,6 +120,9 @@ const MIN_LINE_FRACTION: f64 = 25.0 / 26.0;
 const MIN_AXIS_FRACTION: f64 = 0.75;
 /// Smallest root-mean-square rotation from frame to frame; less is swaying of the carrier.
 const MIN_ROTATION_RAD: f64 = 0.05;
+/// Least length of the mean of unit vectors that sway by up to a right angle: `√2/2`, less what
+/// noise takes.
+const MIN_MEAN_DIRECTION: f64 = 0.6;
 /// Smallest total motion, metres; any tunnel has a larger radius.
 const MIN_MOTION_M: f64 = 1e-6;
 
@@ -143,9 +150,15 @@ impl MotionDirections {
                 (Some(first), Some(last)) if line.dot(&(last.t_wc - first.t_wc)) < 0.0 => -line,
                 _ => line,
             });
+        let views = poses.iter().map(|pose| pose.r_wc * Vector3::z());
+        let rights = poses.iter().map(|pose| pose.r_wc * Vector3::x());
+        // A direction that goes around is 0 in the mean; one that sways is nearly a unit vector.
+        let mean = |sum: Vector3<f64>| sum.norm() / count;
+        let sways = mean(views.sum()).min(mean(rights.sum())) > MIN_MEAN_DIRECTION;
         Self {
             motion,
             turns: does_turn,
+            revolves: does_turn && !sways,
             turning: main_direction(&turns, MIN_AXIS_FRACTION).filter(|_| does_turn),
             middle,
         }

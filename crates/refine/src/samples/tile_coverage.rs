@@ -180,7 +180,7 @@ impl<'a> TileCoverage<'a> {
             self.surface.as_ref(),
             &self.grid,
             &self.camera,
-            self.images.frames.shading().as_deref(),
+            self.images.frames.shading().as_ref(),
             &self.exclusions,
             &posed,
             rows,

@@ -1,6 +1,7 @@
 //! Final poses: those of photometric frames as solved, all others by the prior.
 
 use crate::model::rejection::RejectionReason;
+use crate::options::Photometry;
 use crate::parameters::calibration::Datum;
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::refined::Refined;
@@ -21,6 +22,7 @@ use crate::verdict::prior_test::PriorTest;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use nalgebra::{Matrix6, Vector3};
 use std::sync::Arc;
+use tunnelstitch_core::frames::Light;
 use tunnelstitch_core::survey::MaskedWall;
 use tunnelstitch_geometry::surface::{Bend, GaugeMotion, Surface, WallPoint, bent};
 use tunnelstitch_geometry::trajectory::{Pose, StampedPose};
@@ -224,6 +226,10 @@ impl Placement {
                 stopped_because: parts.stopped_because,
                 levels: parts.levels.into_iter().map(LevelReport::from).collect(),
                 rolling_shutter: parts.rolling_shutter,
+                photometry: match setup.frames.light() {
+                    Light::Normalised => Photometry::Normalised,
+                    Light::Even | Light::Shaded(_) => Photometry::Model,
+                },
                 variance_factor: self.covariances.variance_factor,
                 model_error: parts.model_error,
                 prior_test: self.prior_test,

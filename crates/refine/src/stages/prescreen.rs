@@ -5,6 +5,7 @@ use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
 use crate::tracking::prescreening;
+use tunnelstitch_core::frames::Light;
 
 /// Runs the stage on every frame at the coarsest pyramid level.
 ///
@@ -18,8 +19,8 @@ pub fn run<'a>(
     let context = setup.initial_context(estimation.state.noise);
     let coarsest = setup.coarsest_level();
     let prescreened = prescreening::prescreen(&context, coarsest, session.progress.as_ref())?;
-    if let Some(shading) = prescreened.shading {
-        setup.frames.set_shading(shading);
+    if let (Light::Even, Some(shading)) = (setup.frames.light(), prescreened.shading) {
+        setup.frames.set_light(Light::Shaded(shading));
     }
     estimation.state.noise = prescreened.noise;
     estimation.state.frames.rejections = prescreened.rejections;

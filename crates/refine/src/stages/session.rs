@@ -36,7 +36,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Takes the state from the checkpoint, if it has one, and resumes shading and stopwatch.
+    /// Takes the state from the checkpoint, if it has one, and resumes light and stopwatch.
     ///
     /// # Errors
     /// [`ProblemError::Checkpoint`] if it is damaged.
@@ -47,9 +47,7 @@ impl<'a> Session<'a> {
         let Some(snapshot) = checkpoint.state::<Snapshot>(NAME)? else {
             return Ok(None);
         };
-        if let Some(shading) = snapshot.shading {
-            setup.frames.set_shading(shading);
-        }
+        setup.frames.set_light(snapshot.light);
         self.timings = snapshot.timings;
         self.before_s = snapshot.elapsed_s;
         Ok(Some(snapshot.state))
@@ -70,7 +68,7 @@ impl<'a> Session<'a> {
         {
             let snapshot = Snapshot {
                 state: state(),
-                shading: setup.frames.shading().as_deref().cloned(),
+                light: setup.frames.light(),
                 timings: self.timings.clone(),
                 elapsed_s,
             };

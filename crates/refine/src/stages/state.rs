@@ -15,7 +15,7 @@ use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
-use tunnelstitch_core::frames::Shading;
+use tunnelstitch_core::frames::Light;
 
 /// The part of a refinement's state that a checkpoint keeps.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -24,6 +24,8 @@ pub struct PipelineState {
     pub stages: VecDeque<Stage>,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise: f64,
+    /// False if the light has turned out to be no shading that all frames have in common.
+    pub has_common_light: bool,
     /// Dispersion of the residuals ([`crate::uncertainty::model_error`]), once it is known.
     pub dispersion: f64,
     /// The frames: estimates (none before they are tracked) and rejection reasons.
@@ -82,8 +84,8 @@ impl From<GlobalSolve> for LevelReport {
 pub struct Snapshot {
     /// The state.
     pub state: PipelineState,
-    /// The shading that frames are divided by.
-    pub shading: Option<Shading>,
+    /// Treatment of the frames' light.
+    pub light: Light,
     /// Stages that are over, with their times.
     pub timings: Vec<StageTime>,
     /// Seconds spent on the stage under way.
@@ -98,6 +100,23 @@ pub struct LastSolve<'a> {
     pub uncertainty: SolutionUncertainty,
     /// The stopping rule.
     pub stopping: Stopping,
+}
+
+impl Estimation<'_> {
+    /// A refinement that goes on from a state.
+    pub fn new(state: PipelineState) -> Self {
+        Self {
+            state,
+            solution: None,
+            refined: None,
+        }
+    }
+
+    /// The refinement with its first stage over.
+    pub fn without_first_stage(mut self) -> Self {
+        self.state.stages.pop_front();
+        self
+    }
 }
 
 /// A refinement between two stages.

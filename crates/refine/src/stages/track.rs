@@ -35,9 +35,13 @@ pub fn run<'a>(
             ..state.clone()
         })
     };
-    let frames = tracking.run(&context, setup.options, stopping, progress.as_ref(), keep)?;
-    state.kappa = initial.at(frames.kappa).kappa;
-    state.frames = frames;
+    match tracking.run(&context, setup.options, stopping, progress.as_ref(), keep)? {
+        Some(frames) => {
+            state.kappa = initial.at(frames.kappa).kappa;
+            state.frames = frames;
+        }
+        None => state.has_common_light = false,
+    }
     session.record_time("track");
     Ok(estimation)
 }

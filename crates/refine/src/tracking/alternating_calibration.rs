@@ -14,13 +14,13 @@ use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
-use crate::options::RefineOptions;
+use crate::options::{Photometry, RefineOptions};
 use crate::parameters::calibration::Kappa;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
-use crate::thresholds::alternating_calibration::MAX_SHADING_CHANGE;
+use crate::thresholds::alternating_calibration::{MAX_CHANGE_RATIO, MAX_SHADING_CHANGE};
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::shading_correction::{MAX_SHADING_FRAMES, correct_until_settled};
 use crate::tracking::track::Tracking;
@@ -55,17 +55,19 @@ impl AlternatingCalibration {
         }
     }
 
-    /// Tracks the first frames and corrects the shading, if there is one, where they overlap.
+    /// Tracks the first frames and corrects the shading, if there is one, where they overlap; false
+    /// if that does not settle: the light is no shading that all frames have in common.
     fn correct_shading(
         &mut self,
         context: &EstimationContext,
         options: &RefineOptions,
         progress: &dyn Progress,
-    ) -> Result<(), ProblemError> {
+    ) -> Result<bool, ProblemError> {
+        let mut least_change = f64::INFINITY;
         let frames = self.rejections.len().min(MAX_SHADING_FRAMES);
         for _ in 0..MAX_TRACKING_ITERATIONS {
             let Some(before) = context.frames.shading() else {
-                break;
+                return Ok(true);
             };
             self.tracking = Tracking::new(self.rejections.clone(), self.kappa);
             progress.start("light", frames);
@@ -80,14 +82,19 @@ impl AlternatingCalibration {
             let after = context.frames.shading();
             let change = after.map_or(0.0, |after| after.relative_difference(&before, observed));
             if change < MAX_SHADING_CHANGE {
-                break;
+                return Ok(true);
             }
+            if change > MAX_CHANGE_RATIO * least_change {
+                return Ok(false);
+            }
+            least_change = change;
         }
-        Ok(())
+        Ok(false)
     }
 
-    /// Tracks all frames that are left, and estimates the camera's unknowns if that is asked for.
-    /// `checkpoint` is called after every frame.
+    /// Tracks all frames that are left, and estimates the camera's unknowns if that is asked for;
+    /// None if the light is no shading that all frames have in common, and may be treated
+    /// otherwise. `checkpoint` is called after every frame.
     ///
     /// # Errors
     /// As [`Tracking::track_next`], and those of `checkpoint`.
@@ -98,14 +105,17 @@ impl AlternatingCalibration {
         stopping: Stopping,
         progress: &dyn Progress,
         mut checkpoint: impl FnMut(&Self) -> Result<(), ProblemError>,
-    ) -> Result<FrameStates, ProblemError> {
+    ) -> Result<Option<FrameStates>, ProblemError> {
         let mut context = EstimationContext {
             calibration: context.calibration.intrinsics_only(),
             ..context.clone()
         }
         .at(self.kappa);
         if self.round == 0 && self.tracking.tracked_frames() == 0 {
-            self.correct_shading(&context, options, progress)?;
+            let is_settled = self.correct_shading(&context, options, progress)?;
+            if !is_settled && options.photometry == Photometry::Auto {
+                return Ok(None);
+            }
         }
         loop {
             progress.start("tracking", self.rejections.len());
@@ -118,7 +128,7 @@ impl AlternatingCalibration {
             progress.finish();
             let mut states = self.tracking.clone().into_states();
             if !context.calibration.has_free_parameters() {
-                return Ok(states);
+                return Ok(Some(states));
             }
             let before = context.camera;
             context = context.at(states.kappa);
@@ -134,7 +144,7 @@ impl AlternatingCalibration {
             let change_px = border_displacement_px(&before, &context.camera);
             // Half a pixel of the level where tracking ends changes no registration.
             if change_px < 0.5 * 2f64.powi(level as i32) || self.round == MAX_TRACKING_ITERATIONS {
-                return Ok(states);
+                return Ok(Some(states));
             }
             self.kappa = context.kappa;
             self.tracking = Tracking::new(self.rejections.clone(), context.kappa);

@@ -20,7 +20,7 @@ use crate::solver::neighbourhood::Neighbourhood;
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use nalgebra::Vector2;
 use std::ops::Range;
-use tunnelstitch_core::frames::Shading;
+use tunnelstitch_core::frames::{Light, Shading};
 use tunnelstitch_photometry::{Observation, PhotometricCalibration, Priors};
 
 /// Frames that the shading is estimated from, at the most: it is the same in all.
@@ -86,16 +86,18 @@ fn correct(context: &EstimationContext, points: &[Vec<Observation>], count: usiz
         context.camera.width as usize,
         context.camera.height as usize,
     );
-    let (before, sigmas) = match context.frames.shading() {
-        Some(shading) => ((*shading).clone(), MIN_CHANGE_SIGNIFICANCE_SIGMA),
-        None => (Shading::none(size), MIN_SIGNIFICANCE_SIGMA),
+    let (before, sigmas) = match context.frames.light() {
+        Light::Shaded(shading) => (shading, MIN_CHANGE_SIGNIFICANCE_SIGMA),
+        Light::Even => (Shading::none(size), MIN_SIGNIFICANCE_SIGMA),
+        Light::Normalised => return false,
     };
     let frames = calibrated_frames(count).len();
     let found = PhotometricCalibration::solve(points, frames, &before, &Priors::default());
     let Some(found) = found.filter(|found| found.is_shading_significant(sigmas)) else {
         return false;
     };
-    context.frames.set_shading(before.changed(&found.shading));
+    let shading = before.changed(&found.shading);
+    context.frames.set_light(Light::Shaded(shading));
     true
 }
 

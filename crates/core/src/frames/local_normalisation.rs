@@ -1,0 +1,181 @@
+//! Local normalisation of a frame: what is left of it when light is taken off.
+//!
+//! A frame shows `I = V W` of the wall W in the light V. Light is smooth: where it varies more than
+//! exposures and a shading fixed to the camera describe (a lamp whose distance to the wall changes,
+//! its sheen, mains flicker from row to row, an unknown tone curve, the fall of light along the
+//! tunnel), detail finer than it is still the wall's. With local means taken over a window,
+//!
+//! `N = 128 + 40 (I − Ī)/(√(mean (I − Ī)²) + κ σ)`,
+//!
+//! σ the noise of the frame: contrast relative to that of its surroundings, which the light has
+//! scaled alike, or to the noise where there is no more than that.
+//!
+//! The window of the mean is nine times as wide as high: rows are read one after another, and
+//! flicker varies with the row only.
+
+use super::grey::GreyImage;
+use super::noise::noise_sigma;
+
+/// Half height of the window of the mean over the frame's shorter side: a standard deviation of a
+/// 72nd, for two passes.
+const MEAN_HALF_HEIGHT: f64 = 1.0 / 60.0;
+/// Width of that window over its height.
+const MEAN_ASPECT: f64 = 9.0;
+/// Half side of the window of the spread over the frame's shorter side.
+const SPREAD_HALF_SIDE: f64 = 1.0 / 12.0;
+/// Mean of a normalised frame, grey levels.
+const MIDDLE_GREY: f32 = 128.0;
+/// Spread of a normalised frame where there is no noise, grey levels.
+const SPREAD_GREY: f32 = 40.0;
+/// Multiple κ of the noise that is added to the spread.
+const NOISE_WEIGHT: f32 = 4.0;
+/// Noise of a frame at the least, grey levels: that of rounding to whole levels.
+const MIN_NOISE_GREY: f32 = 0.3;
+/// Grey level from which on a pixel is clipped, and shows nothing but that.
+const CLIPPED_GREY: f32 = 252.0;
+/// Share of clipped pixels in the window of the mean from which on that is not known.
+const MAX_CLIPPED_SHARE: f32 = 0.05;
+
+/// Normalises a frame locally. Pixels without a value and clipped ones have none (NaN).
+pub fn normalise_locally(image: &GreyImage) -> GreyImage {
+    let (width, height) = (image.width(), image.height());
+    let is_clipped = |value: &f32| *value >= CLIPPED_GREY;
+    let known = image.data().iter();
+    let known = known.map(|value| if is_clipped(value) { f32::NAN } else { *value });
+    let known: Vec<f32> = known.collect();
+    let clipped = image
+        .data()
+        .iter()
+        .map(|value| f32::from(u8::from(is_clipped(value))));
+    let clipped: Vec<f32> = clipped.collect();
+    let reach = |share: f64| ((share * width.min(height) as f64).round() as usize).max(1);
+    let half_height = reach(MEAN_HALF_HEIGHT);
+    let mean_window = [(MEAN_ASPECT * half_height as f64) as usize, half_height];
+    let half_side = reach(SPREAD_HALF_SIDE);
+    let mean = local_mean(&local_mean(&known, width, mean_window), width, mean_window);
+    let detail: Vec<f32> = known.iter().zip(&mean).map(|(v, m)| v - m).collect();
+    let squares: Vec<f32> = detail.iter().map(|d| d * d).collect();
+    let variance = local_mean(&squares, width, [half_side; 2]);
+    let noise = noise_sigma(image).map_or(MIN_NOISE_GREY, |sigma| sigma as f32);
+    let floor = NOISE_WEIGHT * noise.max(MIN_NOISE_GREY);
+    let clipped = local_mean(&clipped, width, mean_window);
+    let normalised = detail.iter().zip(variance.iter().zip(&clipped));
+    let normalised = normalised.map(|(d, (variance, clipped))| {
+        if *clipped < MAX_CLIPPED_SHARE {
+            MIDDLE_GREY + SPREAD_GREY * d / (variance.sqrt() + floor)
+        } else {
+            f32::NAN
+        }
+    });
+    GreyImage::new(width, height, normalised.collect())
+}
+
+/// Mean over a window of `2 reach + 1` pixels along x and y around every pixel, of those that have a
+/// value; NaN where none has.
+fn local_mean(values: &[f32], width: usize, [reach_x, reach_y]: [usize; 2]) -> Vec<f32> {
+    let rows: Vec<[f64; 2]> = values
+        .chunks_exact(width)
+        .flat_map(|row| {
+            let sums = row.iter().map(|value| match value.is_nan() {
+                true => [0.0, 0.0],
+                false => [f64::from(*value), 1.0],
+            });
+            windowed_sums(&sums.collect::<Vec<_>>(), reach_x)
+        })
+        .collect();
+    let height = values.len() / width;
+    let mut means = vec![f32::NAN; values.len()];
+    for x in 0..width {
+        let column: Vec<[f64; 2]> = (0..height).map(|y| rows[y * width + x]).collect();
+        for (y, [sum, count]) in windowed_sums(&column, reach_y).into_iter().enumerate() {
+            if count > 0.0 {
+                means[y * width + x] = (sum / count) as f32;
+            }
+        }
+    }
+    means
+}
+
+/// Sums over `2 reach + 1` entries around every entry.
+fn windowed_sums(values: &[[f64; 2]], reach: usize) -> Vec<[f64; 2]> {
+    let mut cumulative = vec![[0.0; 2]];
+    let mut sum = [0.0; 2];
+    for value in values {
+        sum = [sum[0] + value[0], sum[1] + value[1]];
+        cumulative.push(sum);
+    }
+    let window = |k: usize| {
+        let from = cumulative[k.saturating_sub(reach)];
+        let to = cumulative[(k + reach + 1).min(values.len())];
+        [to[0] - from[0], to[1] - from[1]]
+    };
+    (0..values.len()).map(window).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: (usize, usize) = (160, 120);
+
+    /// Fine texture in a light.
+    fn picture(light: impl Fn(f32, f32) -> f32) -> GreyImage {
+        let (w, h) = SIZE;
+        let value = |k: usize| {
+            let (x, y) = ((k % w) as f32, (k / w) as f32);
+            let texture = 1.0 + 0.1 * (1.9 * x).sin() * (1.3 * y).cos();
+            80.0 * texture * light(x / w as f32, y / h as f32)
+        };
+        GreyImage::new(w, h, (0..w * h).map(value).collect())
+    }
+
+    fn rms_difference(a: &GreyImage, b: &GreyImage) -> f32 {
+        let inside = |k: &usize| {
+            let (x, y) = (k % SIZE.0, k / SIZE.0);
+            (20..SIZE.0 - 20).contains(&x) && (15..SIZE.1 - 15).contains(&y)
+        };
+        let squares = (0..a.data().len()).filter(inside);
+        let squares: Vec<f32> = squares
+            .map(|k| (a.data()[k] - b.data()[k]).powi(2))
+            .collect();
+        (squares.iter().sum::<f32>() / squares.len() as f32).sqrt()
+    }
+
+    #[test]
+    fn smooth_light_and_flicker_leave_the_texture_as_it_is() {
+        let even = normalise_locally(&picture(|_, _| 1.0));
+        let spread = rms_difference(
+            &even,
+            &GreyImage::new(SIZE.0, SIZE.1, vec![128.0; 160 * 120]),
+        );
+        assert!(spread > 10.0, "{spread}");
+        let lamp = |u: f32, v: f32| 1.5 / (1.0 + 3.0 * ((u - 0.6).powi(2) + (v - 0.4).powi(2)));
+        let lit = normalise_locally(&picture(lamp));
+        assert!(rms_difference(&even, &lit) < 0.1 * spread);
+        let flicker = |_: f32, v: f32| 1.0 + 0.25 * (std::f32::consts::TAU * 3.0 * v).sin();
+        let flickering = normalise_locally(&picture(flicker));
+        let left = rms_difference(&even, &flickering);
+        assert!(left < 0.2 * spread, "{left} {spread}");
+    }
+
+    #[test]
+    fn clipped_and_unknown_pixels_have_no_value_and_no_influence() {
+        let plain = picture(|_, _| 1.0);
+        let mut hurt = plain.clone();
+        for (k, value) in hurt.data_mut().iter_mut().enumerate() {
+            let (x, y) = (k % SIZE.0, k / SIZE.0);
+            if (70..90).contains(&x) && (50..70).contains(&y) {
+                *value = if x < 80 { 255.0 } else { f32::NAN };
+            }
+        }
+        let (a, b) = (normalise_locally(&plain), normalise_locally(&hurt));
+        for (k, (a, b)) in a.data().iter().zip(b.data()).enumerate() {
+            let (x, y) = (k % SIZE.0, k / SIZE.0);
+            if (70..90).contains(&x) && (50..70).contains(&y) {
+                assert!(b.is_nan());
+            } else {
+                assert!((a - b).abs() < 8.0, "{x} {y}: {a} {b}");
+            }
+        }
+    }
+}
