@@ -67,6 +67,16 @@ impl StoredFrame {
         GreyImage::new(self.width, self.height, data)
     }
 
+    /// Converts to grey levels, 0 to 255, as [`StoredFrame::grey`] does, but clipped pixels keep
+    /// their values.
+    pub fn grey_with_clipped(&self) -> GreyImage {
+        let data = match &self.values {
+            Values::Eight(values) => values.iter().map(|v| f32::from(*v)).collect(),
+            Values::Sixteen(values) => values.iter().map(|v| f32::from(*v) / 257.0).collect(),
+        };
+        GreyImage::new(self.width, self.height, data)
+    }
+
     /// Memory in use, bytes.
     pub fn bytes(&self) -> usize {
         match &self.values {
