@@ -157,9 +157,8 @@ impl RefinedFiles {
         let sections = beside(SECTIONS_FILE).map(|path| read_section_file(&path));
         let perimeter_m = survey.nominal.perimeter_m();
         let masked = beside(MASKED_FILE).map(|path| MaskedWall::read(&path, perimeter_m));
-        let overlay = beside(OVERLAY_FILE).map(|path| {
-            std::fs::read(&path).map_err(|source| ReportError::Read { path, source })
-        });
+        let overlay = beside(OVERLAY_FILE)
+            .map(|path| std::fs::read(&path).map_err(|source| ReportError::Read { path, source }));
         Ok(Self {
             overlay: overlay.transpose()?,
             masked: masked.transpose()?,

@@ -65,7 +65,9 @@ pub fn run(arguments: &CheckArguments, terminal: &Terminal) -> Result<(), Failur
 
 /// Refuses a mask in place of an existing file, or of another format than PNG.
 fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
-    let is_png = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
+    let is_png = path
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("png"));
     if !is_png {
         return Err(Failure::usage(format!(
             "--write-mask {}: a mask is a PNG file; let its name end in .png",

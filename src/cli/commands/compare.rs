@@ -68,9 +68,10 @@ pub fn run(
     record: &RunRecord,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    let mut survey = arguments
-        .reading
-        .open_beside(&arguments.survey, &arguments.refined, terminal)?;
+    let mut survey =
+        arguments
+            .reading
+            .open_beside(&arguments.survey, &arguments.refined, terminal)?;
     if arguments.max_wall_px.is_some() && survey.truth.is_none() {
         return Err(Failure::usage(
             "--max-wall-px needs true poses, and the survey has no poses.truth",

@@ -1,8 +1,8 @@
 //! `tunnelstitch demo`: runs all steps on a simulated survey.
 
 use super::compare::write_comparison;
-use super::refine::print_summary;
 use super::overlay::leave_out_overlay;
+use super::refine::print_summary;
 use super::refine_files::refine_into;
 use super::report::report_into;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
@@ -96,8 +96,7 @@ pub fn run(
     let overlay = leave_out_overlay(&mut survey, arguments.json, terminal)?;
     let options = RefineOptions::default();
     let out = &folders.refined;
-    let (refined, _) =
-        refine_into(&survey, &overlay, &options, out, record, None, terminal)?;
+    let (refined, _) = refine_into(&survey, &overlay, &options, out, record, None, terminal)?;
     if !arguments.json {
         print_summary(&refined, terminal);
     }

@@ -5,6 +5,7 @@ use crate::cli::output::{Failure, RunRecord, Terminal, json};
 use crate::evaluate::deformation::{
     ShapeEstimate, deviation_sigmas_m, measure_sections, sections_csv,
 };
+use crate::frames::{PictureFormat, write_picture};
 use crate::persist::atomic;
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
@@ -12,7 +13,6 @@ use crate::refine::{
     EstimatedShape, RefineInput, RefineOptions, RefineReport, Refined, WallPoints,
     refine_with_checkpoint,
 };
-use crate::frames::{PictureFormat, write_picture};
 use crate::report::{OVERLAY_FILE, REFINEMENT_FILE, SECTIONS_FILE};
 use crate::surface::Bend;
 use crate::survey::{
@@ -119,7 +119,11 @@ fn write_masked_wall(masked: Option<&MaskedWall>, out: &Path) -> Result<(), Fail
 fn write_overlay(overlay: &Overlay, out: &Path) -> Result<(), Failure> {
     let path = out.join(OVERLAY_FILE);
     match &overlay.mask {
-        Some(mask) => Ok(write_picture(&path, &mask.picture().into(), PictureFormat::Png)?),
+        Some(mask) => Ok(write_picture(
+            &path,
+            &mask.picture().into(),
+            PictureFormat::Png,
+        )?),
         None => Ok(atomic::remove_file(&path)?),
     }
 }

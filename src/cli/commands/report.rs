@@ -49,9 +49,10 @@ pub fn run(
     record: &RunRecord,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    let mut survey = arguments
-        .reading
-        .open_beside(&arguments.survey, &arguments.refined, terminal)?;
+    let mut survey =
+        arguments
+            .reading
+            .open_beside(&arguments.survey, &arguments.refined, terminal)?;
     let refined = RefinedFiles::read(&survey, &arguments.refined)?;
     leave_out_overlay(&mut survey, arguments.json, terminal)?;
     let px_per_metre = match arguments.px_per_metre {

@@ -3,8 +3,8 @@
 use super::page_data::{PageData, data_uri};
 use crate::evaluate::Scores;
 use crate::report::model::{Report, ResultSummary};
-use crate::report::refined_files::OVERLAY_FILE;
 use crate::report::quantity::{count, length_unit, maybe, short};
+use crate::report::refined_files::OVERLAY_FILE;
 use maud::{Markup, html};
 
 /// Draws title and headline.

@@ -14,7 +14,10 @@ const BLOCK_PX: usize = 16;
 /// different times, the rows of a field are more alike, so that it is above 1. None if the picture
 /// is smaller than a block or has no contrast.
 pub fn comb_ratio(image: &GreyImage) -> Option<f64> {
-    let (columns, rows) = (image.width() / BLOCK_PX, image.height().saturating_sub(2) / BLOCK_PX);
+    let (columns, rows) = (
+        image.width() / BLOCK_PX,
+        image.height().saturating_sub(2) / BLOCK_PX,
+    );
     let mut ratios: Vec<f32> = (0..columns * rows)
         .filter_map(|k| {
             let (left, top) = (k % columns * BLOCK_PX, k / columns * BLOCK_PX);
@@ -54,7 +57,10 @@ mod tests {
     fn fields_that_move_comb() {
         assert!(comb_ratio(&waves(0.0)).unwrap() < 0.4);
         assert!(comb_ratio(&waves(3.0)).unwrap() > 2.0);
-        assert_eq!(comb_ratio(&GreyImage::new(96, 96, vec![7.0; 96 * 96])), None);
+        assert_eq!(
+            comb_ratio(&GreyImage::new(96, 96, vec![7.0; 96 * 96])),
+            None
+        );
         assert_eq!(comb_ratio(&GreyImage::new(8, 8, vec![7.0; 64])), None);
     }
 
@@ -68,6 +74,9 @@ mod tests {
                 comb_ratio(&GreyImage::new(320, 240, data))
             })
             .collect();
-        assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.05), "{ratios:?}");
+        assert!(
+            ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.05),
+            "{ratios:?}"
+        );
     }
 }

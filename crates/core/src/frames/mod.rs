@@ -34,7 +34,9 @@ pub use noise::{noise_at_level, noise_sigma};
 pub use picture_decoder::open_picture;
 pub use pyramid::Pyramid;
 pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
-pub use static_pixels::{MotionCell, MotionField, TemporalStatistics, find_static_pixels};
+pub use static_pixels::{
+    MotionCell, MotionField, StaticPixels, TemporalStatistics, find_static_pixels,
+};
 pub use stored_frame::StoredFrame;
 pub use video::Video;
 pub use write::{FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};

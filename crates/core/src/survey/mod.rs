@@ -101,9 +101,7 @@ pub use calibrated::FoundFiles;
 pub use capture_times::FrameTimes;
 pub use discover::{Discovery, PictureGroup, VideoChoice};
 pub use error::SurveyError;
-pub use file::{
-    CameraSection, FramesSection, OverlayUse, PriorSection, SURVEY_FILE, SurveyFile,
-};
+pub use file::{CameraSection, FramesSection, OverlayUse, PriorSection, SURVEY_FILE, SurveyFile};
 pub use frame_times::read_frame_times;
 pub use ignore::IgnoreSection;
 pub use masked_wall::{MASKED_FILE, MaskedTile, MaskedWall};

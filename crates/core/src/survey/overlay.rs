@@ -3,7 +3,8 @@
 use super::file::OverlayUse;
 use super::open::Survey;
 use crate::frames::{
-    FrameError, GreyImage, Mask, StoredFrame, TemporalStatistics, comb_ratio, find_static_pixels,
+    FrameError, GreyImage, Mask, StaticPixels, StoredFrame, TemporalStatistics, comb_ratio,
+    find_static_pixels,
 };
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::numerics::median::upper_median;
@@ -32,7 +33,7 @@ pub struct Overlay {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct OverlayReport {
-    /// Number of frames that were examined, between which the wall moves.
+    /// Number of examined frames, which are lit and between which the wall moves.
     pub frames: usize,
     /// Share of the picture that does not move with the wall, 0 to 1, beyond the given mask.
     pub share: f64,
@@ -54,7 +55,11 @@ impl OverlayReport {
             ));
         }
         (self.share > 0.0).then(|| {
-            let use_of = if self.left_out { "left out" } else { "used all the same" };
+            let use_of = if self.left_out {
+                "left out"
+            } else {
+                "used all the same"
+            };
             format!(
                 "{:.1} % of the picture does not move with the wall: {use_of}",
                 100.0 * self.share
@@ -78,10 +83,11 @@ impl Survey {
             let grey = picture.grey_with_clipped();
             Ok((comb_ratio(&grey), TemporalStatistics::reduce(grey)))
         });
-        let decoded = decoded.into_iter().collect::<Result<Vec<_>, FrameError>>()?;
+        let decoded = decoded
+            .into_iter()
+            .collect::<Result<Vec<_>, FrameError>>()?;
         let ratios: Vec<f64> = decoded.iter().filter_map(|(ratio, _)| *ratio).collect();
         let mut report = OverlayReport {
-            frames: chosen.len(),
             interlaced: is_interlaced(&ratios),
             ..OverlayReport::default()
         };
@@ -89,19 +95,29 @@ impl Survey {
         let pictures: Vec<GreyImage> = decoded.into_iter().map(|(_, grey)| grey).collect();
         let size = [width as usize, height as usize];
         let statistics = TemporalStatistics::new(size, pictures, self.frames.mask());
+        report.frames = statistics.as_ref().map_or(0, TemporalStatistics::frames);
         let statistics = statistics.filter(|statistics| statistics.frames() >= MIN_FRAMES);
-        report.skipped = match &statistics {
-            _ if keeps => None,
-            None => Some(format!(
-                "{} frames are lit and far enough apart for the wall to move between them, fewer \
-                 than {MIN_FRAMES}",
-                chosen.len()
-            )),
-            Some(_) => None,
+        if keeps {
+            return Ok(Overlay { report, mask: None });
+        }
+        let found = statistics.map(|statistics| find_static_pixels(&statistics, &motion));
+        let mask = match found {
+            Some(StaticPixels::Found(mask)) => Some(mask),
+            Some(StaticPixels::Absent) => None,
+            Some(StaticPixels::WallRepeats) => {
+                let reason = "the wall repeats itself with the step of the camera";
+                report.skipped = Some(reason.to_owned());
+                None
+            }
+            None => {
+                report.skipped = Some(format!(
+                    "they show in {MIN_FRAMES} frames or more between which the wall moves, and \
+                     here are {}",
+                    report.frames
+                ));
+                None
+            }
         };
-        let mask = statistics
-            .filter(|_| !keeps)
-            .and_then(|statistics| find_static_pixels(&statistics, &motion));
         report.share = mask.as_ref().map_or(0.0, Mask::masked_fraction);
         report.left_out = mask.is_some();
         Ok(Overlay { report, mask })
@@ -154,7 +170,10 @@ mod tests {
             ..OverlayReport::default()
         };
         let said = report(0.019, None).sentence().unwrap();
-        assert_eq!(said, "1.9 % of the picture does not move with the wall: left out");
+        assert_eq!(
+            said,
+            "1.9 % of the picture does not move with the wall: left out"
+        );
         assert_eq!(report(0.0, None).sentence(), None);
         let said = report(0.0, Some("3 frames")).sentence().unwrap();
         assert!(said.ends_with("not sought: 3 frames"), "{said}");

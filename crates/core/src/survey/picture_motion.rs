@@ -27,14 +27,18 @@ impl Survey {
         let mut chosen = vec![0];
         for (frame, pose) in poses.iter().enumerate().skip(1) {
             let last = chosen.last().map_or(0, |last| *last);
-            let motion = probes.iter().filter_map(|pixel| self.motion(pixel, &poses[last], pose));
+            let motion = probes
+                .iter()
+                .filter_map(|pixel| self.motion(pixel, &poses[last], pose));
             let sizes = motion.map(|[u, v]| u.hypot(v)).collect();
             if upper_median(sizes).is_some_and(|size| size >= MIN_STEP) {
                 chosen.push(frame);
             }
         }
         let count = chosen.len().min(MAX_FRAMES);
-        let chosen: Vec<usize> = (0..count).map(|k| chosen[k * chosen.len() / count]).collect();
+        let chosen: Vec<usize> = (0..count)
+            .map(|k| chosen[k * chosen.len() / count])
+            .collect();
         let cells = self.grid_pixels(FIELD).into_par_iter().map(|pixel| {
             let pairs = chosen.windows(2);
             let motion = pairs.filter_map(|p| self.motion(&pixel, &poses[p[0]], &poses[p[1]]));

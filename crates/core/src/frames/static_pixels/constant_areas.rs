@@ -4,8 +4,8 @@ use super::outline::{keep_regions, picture};
 use super::ridges::smoothed;
 use super::temporal_statistics::TemporalStatistics;
 use crate::frames::noise::MAD_TO_SIGMA;
-use imageproc::distance_transform::Norm;
 use image::GrayImage;
+use imageproc::distance_transform::Norm;
 use imageproc::morphology::{dilate, open};
 use tunnelstitch_geometry::numerics::median::median;
 
@@ -42,7 +42,10 @@ pub(super) fn constant_areas(statistics: &TemporalStatistics) -> GrayImage {
         let is_border = |k: &&usize| {
             let (u, v) = (**k % width, **k / width);
             let inside = (1..width - 1).contains(&u) && (1..height - 1).contains(&v);
-            inside && [**k - 1, **k + 1, **k - width, **k + width].iter().any(|n| constant_pixels[*n] == 0)
+            inside
+                && [**k - 1, **k + 1, **k - width, **k + width]
+                    .iter()
+                    .any(|n| constant_pixels[*n] == 0)
         };
         let border: Vec<&usize> = pixels.iter().filter(is_border).collect();
         let sharp = border.iter().filter(|k| edge_pixels[***k] > 0).count();

@@ -1,8 +1,8 @@
 //! Outlines of overlays: growth from seeds, closing, holes.
 
 use super::temporal_statistics::TemporalStatistics;
-use imageproc::distance_transform::Norm;
 use image::{GrayImage, Luma, imageops};
+use imageproc::distance_transform::Norm;
 use imageproc::morphology::{close as close_gaps, dilate};
 use imageproc::region_labelling::{Connectivity, connected_components};
 
@@ -48,19 +48,17 @@ pub(super) fn close(found: &GrayImage) -> GrayImage {
     // With a margin: beyond the border, closing would find nothing to erode with.
     let margin = u32::from(reach);
     let mut padded = GrayImage::new(width + 2 * margin, height + 2 * margin);
-    imageops::replace(
-        &mut padded,
-        found,
-        i64::from(margin),
-        i64::from(margin),
-    );
+    imageops::replace(&mut padded, found, i64::from(margin), i64::from(margin));
     let closed = close_gaps(&padded, Norm::LInf, reach);
-    let closed =
-        imageops::crop_imm(&closed, margin, margin, width, height).to_image();
-    let open = GrayImage::from_fn(width, height, |u, v| Luma([255 - closed.get_pixel(u, v).0[0]]));
+    let closed = imageops::crop_imm(&closed, margin, margin, width, height).to_image();
+    let open = GrayImage::from_fn(width, height, |u, v| {
+        Luma([255 - closed.get_pixel(u, v).0[0]])
+    });
     let max_hole = MAX_HOLE_SHARE * f64::from(width) * f64::from(height);
     let wall = keep_regions(&open, |pixels| pixels.len() as f64 > max_hole);
-    let filled = GrayImage::from_fn(width, height, |u, v| Luma([255 - wall.get_pixel(u, v).0[0]]));
+    let filled = GrayImage::from_fn(width, height, |u, v| {
+        Luma([255 - wall.get_pixel(u, v).0[0]])
+    });
     dilate(&filled, Norm::LInf, 1)
 }
 
@@ -74,10 +72,7 @@ pub(super) fn picture(size: [usize; 2], is_marked: impl Fn(usize) -> bool) -> Gr
 }
 
 /// The connected regions of a picture for whose pixels, row-major indices, `is_kept` holds.
-pub(super) fn keep_regions(
-    marked: &GrayImage,
-    is_kept: impl Fn(&[usize]) -> bool,
-) -> GrayImage {
+pub(super) fn keep_regions(marked: &GrayImage, is_kept: impl Fn(&[usize]) -> bool) -> GrayImage {
     let labels = connected_components(marked, Connectivity::Eight, Luma([0]));
     let count = labels.iter().max().map_or(0, |most| *most as usize);
     let mut regions: Vec<Vec<usize>> = vec![Vec::new(); count + 1];

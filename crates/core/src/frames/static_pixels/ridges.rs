@@ -16,42 +16,83 @@ const MIN_MOTION: f64 = 0.02;
 /// Smallest contrast of a ridge, in units of the frames' medians: weaker ones matter to nothing.
 const MIN_CONTRAST: f32 = 0.04;
 
+/// Smallest number of independent frames. With fewer, the wall looks alike from frame to frame,
+/// because it repeats itself with the step of the camera, and cannot be told from an overlay.
+const MIN_INDEPENDENT_FRAMES: f32 = 8.0;
+/// Variance of a difference of two pixels over that of [`second_difference`], for white noise.
+const DIFFERENCE_VARIANCE: f32 = 2.0 / 1.5;
+
 /// Strength of each pixel's ridge, row-major: its contrast in standard deviations of the wall's; 0
-/// where there is none.
+/// where there is none. None if the wall looks alike from frame to frame.
 ///
 /// With the smoothed temporal mean M, the unit vector û along the wall's motion and a distance r,
 /// the differences are `a = M(p) − M(p − r û)` and `b = M(p) − M(p + r û)`, and the contrast
 /// `min(|a|, |b|)` if a and b have the same sign: it is 0 on shading that grows to one side, beside
 /// an overlay, and on structures of the wall that extend along the motion. The standard deviation
-/// is that of all differences in the picture, robustly. It holds what is left of the wall's
-/// repetitions and of the overlap of frames.
+/// σ of a and b is `√(4/3)` of that of `(a + b)/2`, on which shading has no influence, robustly
+/// over the picture. It holds what is left of the wall's repetitions and of the overlap of frames.
+/// The number of independent frames is the variance of `(a + b)/2` in a frame over that in the
+/// temporal mean.
 ///
 /// Source of the empirical null distribution: B. Efron, "Large-scale simultaneous hypothesis
 /// testing: the choice of a null hypothesis", Journal of the American Statistical Association
 /// 99(465), 2004.
-pub(super) fn ridge_strength(statistics: &TemporalStatistics, motion: &MotionField) -> Vec<f32> {
+pub(super) fn ridge_strength(
+    statistics: &TemporalStatistics,
+    motion: &MotionField,
+) -> Option<Vec<f32>> {
     let mut strength = vec![0.0f32; statistics.open.len()];
+    let mut is_tested = false;
     for (passes, reach_px) in SCALES {
         let smooth = smoothed(&statistics.mean, passes);
+        let samples: Vec<GreyImage> = statistics
+            .samples
+            .iter()
+            .map(|sample| smoothed(sample, passes))
+            .collect();
         for axis in 0..2 {
-            let pairs = differences(&smooth, &statistics.open, motion, axis, reach_px);
-            let mut sizes: Vec<f32> = (pairs.iter().flatten())
-                .filter(|difference| difference.is_finite())
-                .map(|difference| difference.abs())
-                .collect();
-            if sizes.is_empty() {
-                continue;
-            }
-            let sigma = (MAD_TO_SIGMA as f32 * median(&mut sizes)).max(f32::MIN_POSITIVE);
-            for (strongest, [a, b]) in strength.iter_mut().zip(&pairs) {
-                let contrast = a.abs().min(b.abs());
-                if a * b > 0.0 && contrast >= MIN_CONTRAST {
-                    *strongest = strongest.max(contrast / sigma);
-                }
+            let of = |image| differences(image, &statistics.open, motion, axis, reach_px);
+            let pairs = of(&smooth);
+            let mut sizes: Vec<f32> = pairs.iter().filter_map(second_difference).collect();
+            sizes.iter_mut().for_each(|size| *size = size.abs());
+            let sigma = MAD_TO_SIGMA as f32 * median(&mut sizes);
+            let in_frames = samples.iter().map(|sample| mean_square(&of(sample)));
+            let in_a_frame = in_frames.sum::<f32>() / samples.len() as f32;
+            // Also false if there are no pixels, so that both are NaN.
+            if in_a_frame >= MIN_INDEPENDENT_FRAMES * sigma * sigma {
+                is_tested = true;
+                let sigma = (DIFFERENCE_VARIANCE.sqrt() * sigma).max(f32::MIN_POSITIVE);
+                keep_strongest(&mut strength, &pairs, sigma);
             }
         }
     }
-    strength
+    is_tested.then_some(strength)
+}
+
+/// Raises the strengths to those of the ridges of `pairs`.
+fn keep_strongest(strength: &mut [f32], pairs: &[[f32; 2]], sigma: f32) {
+    for (strongest, [a, b]) in strength.iter_mut().zip(pairs) {
+        let contrast = a.abs().min(b.abs());
+        if a * b > 0.0 && contrast >= MIN_CONTRAST {
+            *strongest = strongest.max(contrast / sigma);
+        }
+    }
+}
+
+/// `(a + b)/2` of the differences to either side; None where one is not known.
+fn second_difference([a, b]: &[f32; 2]) -> Option<f32> {
+    let mean = 0.5 * (a + b);
+    mean.is_finite().then_some(mean)
+}
+
+/// Mean square of the second differences; NaN of none.
+fn mean_square(pairs: &[[f32; 2]]) -> f32 {
+    let (mut sum, mut count) = (0.0f64, 0.0f64);
+    for difference in pairs.iter().filter_map(second_difference) {
+        sum += f64::from(difference).powi(2);
+        count += 1.0;
+    }
+    (sum / count) as f32
 }
 
 /// Differences (a, b) of each pixel along the motion (axis 0) or across it (axis 1); NaN where the
@@ -97,7 +138,10 @@ fn bilinear(image: &GreyImage, u: f64, v: f64) -> f32 {
     }
     let (x, y) = (u as usize, v as usize);
     let (fx, fy) = ((u - x as f64) as f32, (v - y as f64) as f32);
-    let (right, below) = ((x + 1).min(image.width() - 1), (y + 1).min(image.height() - 1));
+    let (right, below) = (
+        (x + 1).min(image.width() - 1),
+        (y + 1).min(image.height() - 1),
+    );
     let row = |y: usize| (1.0 - fx) * image.at(x, y) + fx * image.at(right, y);
     (1.0 - fy) * row(y) + fy * row(below)
 }

@@ -13,6 +13,8 @@ const MAX_WIDTH: usize = 480;
 const TRIMMED_SHARE: f64 = 0.1;
 /// Smallest median of a frame, grey levels: darker ones show no wall.
 const MIN_LEVEL: f32 = 4.0;
+/// Largest number of frames that are kept as they are.
+const MAX_SAMPLES: usize = 8;
 /// Interquartile range of a Gaussian, multiples of σ.
 const QUARTILES_TO_SIGMA: f32 = 1.349;
 
@@ -27,6 +29,8 @@ pub struct TemporalStatistics {
     /// Robust 1-σ of the values, with or without the frames' gains, whichever is smaller: what is
     /// burnt into the pictures has no gain, what the lens has in front of it has.
     pub(super) spread: GreyImage,
+    /// A few of the frames, divided by their medians.
+    pub(super) samples: Vec<GreyImage>,
     /// True for pixels that a mask does not hide yet.
     pub(super) open: Vec<bool>,
 }
@@ -50,11 +54,14 @@ impl TemporalStatistics {
         mask: Option<&Arc<Mask>>,
     ) -> Option<Self> {
         let level = halvings(full[0]);
-        let medians = pictures.par_iter().map(|picture| median(&mut picture.data().to_vec()));
+        let medians = pictures
+            .par_iter()
+            .map(|picture| median(&mut picture.data().to_vec()));
         let medians: Vec<f32> = medians.collect();
         let with_medians = pictures.into_iter().zip(medians);
-        let lit: Vec<(GreyImage, f32)> =
-            with_medians.filter(|(_, median)| *median >= MIN_LEVEL).collect();
+        let lit: Vec<(GreyImage, f32)> = with_medians
+            .filter(|(_, median)| *median >= MIN_LEVEL)
+            .collect();
         let common = median(&mut lit.iter().map(|(_, level)| *level).collect::<Vec<_>>());
         let (width, height) = (lit.first()?.0.width(), lit[0].0.height());
         let values: Vec<[f32; 2]> = (0..width * height)
@@ -70,6 +77,12 @@ impl TemporalStatistics {
                 [trimmed_mean(gained), sigma(gained).min(sigma(raw))]
             })
             .collect();
+        let step = lit.len().div_ceil(MAX_SAMPLES);
+        let samples = lit.iter().step_by(step).map(|(picture, median)| {
+            let data = picture.data().iter().map(|value| value / median);
+            GreyImage::new(width, height, data.collect())
+        });
+        let samples = samples.collect();
         let image = |k: usize| GreyImage::new(width, height, values.iter().map(|v| v[k]).collect());
         let hidden = mask.map(|mask| PyramidMask::new(Arc::clone(mask)).halved(level));
         Some(Self {
@@ -78,8 +91,13 @@ impl TemporalStatistics {
             frames: lit.len(),
             mean: image(0),
             spread: image(1),
+            samples,
             open: (0..width * height)
-                .map(|k| hidden.as_ref().is_none_or(|m| m.is_wall(k % width, k / width)))
+                .map(|k| {
+                    hidden
+                        .as_ref()
+                        .is_none_or(|m| m.is_wall(k % width, k / width))
+                })
                 .collect(),
         })
     }
