@@ -107,7 +107,7 @@ fn black_corners_and_bars_are_hidden_as_a_whole() {
     let black = |u, v, grey| if is_black(u, v) { 3.0 } else { grey };
     let found = find(frames(3, false, black));
     let [hidden, others] = shares(&found, is_black);
-    assert!(hidden > 0.95 && others < 0.04, "{hidden} {others}");
+    assert!(hidden > 0.93 && others < 0.04, "{hidden} {others}");
 }
 
 #[test]
