@@ -1,4 +1,5 @@
-//! What moves with the picture and not with the wall, and interlaced frames, through the program.
+//! Overlays that move with the picture and not with the wall, and interlaced frames, through the
+//! program.
 
 use crate::support::{edit, fail, json, simulate, succeed, text, tunnelstitch};
 use image::GrayImage;

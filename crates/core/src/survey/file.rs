@@ -101,7 +101,7 @@ pub struct FramesSection {
     /// [`crate::frames::Mask`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mask: Option<PathBuf>,
-    /// What happens to pixels that do not move with the wall; they are left out by default.
+    /// Use of pixels that do not move with the wall; they are left out by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub overlay: Option<OverlayUse>,
 }

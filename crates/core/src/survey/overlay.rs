@@ -1,4 +1,4 @@
-//! What moves with the picture and not with the wall, in a survey.
+//! Pixels of a survey that move with the picture and not with the wall.
 
 use super::file::OverlayUse;
 use super::open::Survey;
@@ -23,7 +23,7 @@ const MIN_COMBED_SHARE: f64 = 0.75;
 /// Pixels that do not move with the wall.
 #[derive(Clone, Debug, Default)]
 pub struct Overlay {
-    /// What was found, in numbers.
+    /// The finding in numbers.
     pub report: OverlayReport,
     /// The mask that hides them, if there are any.
     pub mask: Option<Mask>,
@@ -47,7 +47,7 @@ pub struct OverlayReport {
 }
 
 impl OverlayReport {
-    /// What was found, in a sentence without its full stop; None if there is nothing to say.
+    /// The finding in a sentence without its full stop; None if there is nothing to say.
     pub fn sentence(&self) -> Option<String> {
         if let Some(reason) = &self.skipped {
             return Some(format!(
