@@ -1,16 +1,19 @@
 //! Check of a survey before it is refined: frames, overlap, expected jitter, texture, effort, and
 //! what to do about them.
 //!
-//! A dozen frames are decoded; of the others only the headers are read. Everything else is geometry
+//! Up to 64 frames are decoded; of the others only the headers are read.
+//! Everything else is geometry
 //! of the initial poses.
 //!
 //! ```text
 //! Survey ─┬─ MaskCheck, PosesCheck, OverlapCheck, JitterCheck ─┐
 //!         ├─ PictureCheck (a dozen frames) ────────────────────┼─> Check ── warnings
+//!         ├─ OverlayReport (up to 64 frames) ──────────────────┤
 //!         └─ Effort (time and memory) ─────────────────────────┘
 //! ```
 
 mod effort;
+mod interlacing;
 mod jitter;
 mod masks;
 mod overlap;
@@ -22,6 +25,7 @@ mod statistics;
 mod warnings;
 
 pub use effort::Effort;
+pub use interlacing::interlacing_warning;
 pub use jitter::JitterCheck;
 pub use masks::MaskCheck;
 pub use overlap::OverlapCheck;

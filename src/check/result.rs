@@ -6,6 +6,8 @@ use super::masks::MaskCheck;
 use super::overlap::OverlapCheck;
 use super::pictures::PictureCheck;
 use super::poses::PosesCheck;
+use crate::frames::Mask;
+use crate::survey::OverlayReport;
 use serde::Serialize;
 
 /// Result of the check of a survey.
@@ -20,6 +22,11 @@ pub struct Check {
     pub shown_share: f64,
     /// Parts of image and wall that are left out.
     pub masks: MaskCheck,
+    /// Pixels that do not move with the wall, and interlacing.
+    pub overlay: OverlayReport,
+    /// The mask that hides these pixels and those of the survey's mask; none if all show the wall.
+    #[serde(skip)]
+    pub proposed_mask: Option<Mask>,
     /// Positions and steps of the initial poses.
     pub poses: PosesCheck,
     /// Overlap of neighbours and of turns.

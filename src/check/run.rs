@@ -1,6 +1,7 @@
 //! The check of a survey.
 
 use super::effort::Effort;
+use super::interlacing::interlacing_warning;
 use super::jitter::JitterCheck;
 use super::masks::MaskCheck;
 use super::overlap::OverlapCheck;
@@ -10,7 +11,7 @@ use super::result::Check;
 use super::warnings::warnings;
 use crate::render::native_px_per_metre;
 use crate::surface::SurfaceError;
-use crate::survey::Survey;
+use crate::survey::{Overlay, Survey};
 
 /// Checks a survey without refining it.
 ///
@@ -24,6 +25,21 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
         .map_err(|_| SurfaceError::LooksAlongTheAxis)?;
     let overlap = OverlapCheck::of(survey, &poses);
     let (pictures, mut faults) = PictureCheck::of(survey);
+    let overlay = match survey.find_overlay() {
+        Ok(overlay) => overlay,
+        Err(error) => {
+            let fault = error.to_string();
+            if !faults.contains(&fault) && faults.is_empty() {
+                faults.push(fault);
+            }
+            Overlay::default()
+        }
+    };
+    let own = survey.frames.mask().map(|mask| mask.as_ref().clone());
+    let proposed_mask = match (own, overlay.mask) {
+        (Some(own), Some(found)) => Some(own.union(&found)),
+        (own, found) => own.or(found),
+    };
     if survey.frames.len() < 2 {
         faults.push("there is one frame; refine needs two that overlap".to_owned());
     }
@@ -32,6 +48,8 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
         size_px: [survey.camera.width, survey.camera.height],
         shown_share: survey.camera.visible_fraction(),
         masks: MaskCheck::of(survey),
+        overlay: overlay.report,
+        proposed_mask,
         poses: PosesCheck::of(survey),
         jitter: JitterCheck::of(survey, px_per_metre, &overlap),
         overlap,
@@ -41,6 +59,9 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
         faults,
         warnings: survey.warnings.clone(),
     };
+    if check.overlay.interlaced {
+        check.warnings.push(interlacing_warning(survey));
+    }
     check.warnings.extend(warnings(&check));
     Ok(check)
 }

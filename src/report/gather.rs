@@ -7,7 +7,7 @@ use super::model::{
     Abscissa, FrameRow, Report, ResultSummary, SCHEMA_VERSION, SurveyFacts, WallMaps,
 };
 use super::pictures::{Pictures, panoramas, thumbnails};
-use super::refined_files::{REFINEMENT_FILE, RefinedFiles, Refinement};
+use super::refined_files::{OVERLAY_FILE, REFINEMENT_FILE, RefinedFiles, Refinement};
 use crate::evaluate::{ComparedPanoramas, Comparison, SeamMap, WallError};
 use crate::refine::FrameFlag;
 use crate::survey::Survey;
@@ -58,6 +58,9 @@ pub fn gather(sources: Sources) -> Result<(Report, Pictures), ReportError> {
         if !line.is_empty() && !commands.contains(&line) {
             commands.push(line);
         }
+    }
+    if let Some(overlay) = &refined.overlay {
+        pictures.insert(OVERLAY_FILE.to_owned(), overlay.clone());
     }
     let report = Report {
         schema_version: SCHEMA_VERSION,

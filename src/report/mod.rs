@@ -49,6 +49,7 @@ pub use model::{
 pub use page::page;
 pub use pictures::{PICTURES, Pictures};
 pub use refined_files::{
-    CalibratedUnknown, Calibration, REFINEMENT_FILE, RefinedFiles, Refinement, SECTIONS_FILE,
+    CalibratedUnknown, Calibration, OVERLAY_FILE, REFINEMENT_FILE, RefinedFiles, Refinement,
+    SECTIONS_FILE,
 };
 pub use resolution::choose_resolution;

@@ -6,7 +6,7 @@ use crate::refine::{
     FrameReport, LengthScale, LevelReport, MaskedReport, PointsReport, PriorTest, ShapeReport,
     StageTime, SurveyVerdict, read_covariances,
 };
-use crate::survey::{MASKED_FILE, MaskedWall, Survey};
+use crate::survey::{MASKED_FILE, MaskedWall, OverlayReport, Survey};
 use crate::trajectory::{Pose, poses_of};
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
@@ -47,6 +47,9 @@ pub struct Refinement {
     /// The wall that was left out; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked: Option<MaskedReport>,
+    /// Pixels that do not move with the wall; none in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub overlay: Option<OverlayReport>,
     /// Measured points of the wall, if there were any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points: Option<PointsReport>,
@@ -99,6 +102,8 @@ pub struct CalibratedUnknown {
 pub const REFINEMENT_FILE: &str = "refine.json";
 /// Name of the table of sections beside the poses.
 pub const SECTIONS_FILE: &str = "sections.csv";
+/// Name of the mask of what does not move with the wall, beside the poses.
+pub const OVERLAY_FILE: &str = "overlay.png";
 /// Name of the covariances beside the poses.
 const COVARIANCES: &str = "covariance.csv";
 
@@ -116,6 +121,8 @@ pub struct RefinedFiles {
     pub covariances: Option<Vec<Matrix6<f64>>>,
     /// Deformation of the wall's sections, if `sections.csv` exists.
     pub sections: Option<Vec<SectionDeformation>>,
+    /// The file [`OVERLAY_FILE`], if it exists.
+    pub overlay: Option<Vec<u8>>,
     /// The wall that was left out, if `masked.json` exists.
     pub masked: Option<MaskedWall>,
 }
@@ -150,7 +157,10 @@ impl RefinedFiles {
         let sections = beside(SECTIONS_FILE).map(|path| read_section_file(&path));
         let perimeter_m = survey.nominal.perimeter_m();
         let masked = beside(MASKED_FILE).map(|path| MaskedWall::read(&path, perimeter_m));
+        let overlay = beside(OVERLAY_FILE)
+            .map(|path| std::fs::read(&path).map_err(|source| ReportError::Read { path, source }));
         Ok(Self {
+            overlay: overlay.transpose()?,
             masked: masked.transpose()?,
             sections: sections.transpose()?,
             refinement: refinement.transpose()?,
@@ -168,6 +178,7 @@ impl RefinedFiles {
             beside(COVARIANCES, self.covariances.is_some()),
             beside(SECTIONS_FILE, self.sections.is_some()),
             beside(MASKED_FILE, self.masked.is_some()),
+            beside(OVERLAY_FILE, self.overlay.is_some()),
         ];
         let poses = std::iter::once(self.path.clone());
         poses.chain(others.into_iter().flatten()).collect()

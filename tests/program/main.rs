@@ -16,6 +16,7 @@ mod locate;
 mod masks;
 mod mutations;
 mod opencv;
+mod overlays;
 mod panorama;
 mod plan;
 mod points;

@@ -25,7 +25,11 @@ fn simulated(folder: &Path, name: &str, more: &[&str]) -> std::path::PathBuf {
 }
 
 fn without_its_mask(survey: &Path) {
-    edit(&survey.join("survey.toml"), "mask = \"mask.png\"\n", "");
+    edit(
+        &survey.join("survey.toml"),
+        "mask = \"mask.png\"\n",
+        "overlay = \"keep\"\n",
+    );
 }
 
 /// Refines a survey; returns `refine.json` and the error on the wall, pixels.

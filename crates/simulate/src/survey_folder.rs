@@ -163,6 +163,7 @@ fn write_text_files(
             angle_step_deg: None,
             times: None,
             mask: scene.shaft().map(|_| MASK_FILE.into()),
+            overlay: None,
         },
         poses: PosesSection {
             truth: Some("groundtruth.tum".into()),

@@ -3,7 +3,8 @@
 use crate::check::{self, Check, MaskCheck, PosesCheck};
 use crate::cli::arguments::PoseReadingArguments;
 use crate::cli::output::{Failure, Terminal, json};
-use std::path::PathBuf;
+use crate::frames::{PictureFormat, write_picture};
+use std::path::{Path, PathBuf};
 
 /// Checks a survey in seconds: frames, overlap, expected jitter, texture, and the time and memory
 /// that refine needs.
@@ -11,7 +12,9 @@ use std::path::PathBuf;
 /// Exits with code 3 if anything would make refine or stitch fail. Warnings name what needs
 /// attention, and the remedy.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  tunnelstitch check my-survey")]
+#[command(after_help = "Examples:\n  \
+    tunnelstitch check my-survey\n  \
+    tunnelstitch check my-survey --write-mask my-survey/mask.png")]
 pub struct CheckArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
@@ -20,6 +23,13 @@ pub struct CheckArguments {
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+    /// Write a mask that hides what does not move with the wall, such as burnt-in text, logos and
+    /// dirt on the lens, and what the survey's own mask hides: black where the wall is never seen.
+    #[arg(long, value_name = "FILE.png")]
+    write_mask: Option<PathBuf>,
+    /// Replace an existing file of --write-mask.
+    #[arg(long, requires = "write_mask")]
+    force: bool,
 }
 
 /// Runs the command.
@@ -27,6 +37,9 @@ pub struct CheckArguments {
 /// # Errors
 /// Everything that makes the survey unusable.
 pub fn run(arguments: &CheckArguments, terminal: &Terminal) -> Result<(), Failure> {
+    if let Some(path) = &arguments.write_mask {
+        refuse_existing(path, arguments.force)?;
+    }
     let survey = arguments.reading.open_quietly(&arguments.survey)?;
     let check = check::check(&survey)?;
     if arguments.json {
@@ -37,11 +50,50 @@ pub fn run(arguments: &CheckArguments, terminal: &Terminal) -> Result<(), Failur
             terminal.warn(warning);
         }
     }
+    if let Some(path) = &arguments.write_mask {
+        let said = write_mask(&check, path)?;
+        if !arguments.json {
+            terminal.say(said);
+        }
+    }
     if check.faults.is_empty() {
         Ok(())
     } else {
         Err(Failure::input(check.faults.join("\nerror: ")))
     }
+}
+
+/// Refuses a mask in place of an existing file, or of another format than PNG.
+fn refuse_existing(path: &Path, force: bool) -> Result<(), Failure> {
+    let is_png = path
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("png"));
+    if !is_png {
+        return Err(Failure::usage(format!(
+            "--write-mask {}: a mask is a PNG file; let its name end in .png",
+            path.display()
+        )));
+    }
+    if path.exists() && !force {
+        return Err(Failure::input(format!(
+            "{}: exists already; --force replaces it",
+            path.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Writes the proposed mask, if there is one; returns a sentence about it.
+fn write_mask(check: &Check, path: &Path) -> Result<String, Failure> {
+    let Some(mask) = &check.proposed_mask else {
+        return Ok("all pixels show the wall: no mask was written".to_owned());
+    };
+    write_picture(path, &mask.picture().into(), PictureFormat::Png)?;
+    Ok(format!(
+        "wrote {}, which hides {:.1} % of the picture; use it by [frames] mask in survey.toml",
+        path.display(),
+        100.0 * mask.masked_fraction()
+    ))
 }
 
 /// Shares of the image that the mask hides and of the wall that is ignored, if there are any.
@@ -75,6 +127,7 @@ fn summary(check: &Check) -> String {
             )),
         ),
         ("masks", mask_text(&check.masks)),
+        ("overlay", check.overlay.sentence()),
         ("poses", Some(poses_text(poses))),
         (
             "overlap",

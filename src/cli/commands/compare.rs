@@ -1,6 +1,7 @@
 //! `tunnelstitch compare`: compares initial with refined poses.
 
 use crate::cli::arguments::{PictureArguments, PoseReadingArguments, positive};
+use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::evaluate::{ComparedPanoramas, Comparison, compare_survey, draw_before_after};
 use crate::frames::{PictureFormat, write_picture};
@@ -67,15 +68,17 @@ pub fn run(
     record: &RunRecord,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    let survey = arguments
-        .reading
-        .open_beside(&arguments.survey, &arguments.refined, terminal)?;
+    let mut survey =
+        arguments
+            .reading
+            .open_beside(&arguments.survey, &arguments.refined, terminal)?;
     if arguments.max_wall_px.is_some() && survey.truth.is_none() {
         return Err(Failure::usage(
             "--max-wall-px needs true poses, and the survey has no poses.truth",
         ));
     }
     let refined = poses_of(&survey.read_poses(&arguments.refined)?);
+    leave_out_overlay(&mut survey, arguments.json, terminal)?;
     atomic::create_folder(&arguments.out)?;
     let (comparison, drawings) = compare_survey(
         &survey,

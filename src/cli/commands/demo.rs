@@ -1,6 +1,7 @@
 //! `tunnelstitch demo`: runs all steps on a simulated survey.
 
 use super::compare::write_comparison;
+use super::overlay::leave_out_overlay;
 use super::refine::print_summary;
 use super::refine_files::refine_into;
 use super::report::report_into;
@@ -91,9 +92,11 @@ pub fn run(
     say(format!(
         "\ntunnelstitch refine {survey_path} --out {refined_path}"
     ));
-    let survey = Survey::open(&folders.survey)?;
+    let mut survey = Survey::open(&folders.survey)?;
+    let overlay = leave_out_overlay(&mut survey, arguments.json, terminal)?;
     let options = RefineOptions::default();
-    let (refined, _) = refine_into(&survey, &options, &folders.refined, record, None, terminal)?;
+    let out = &folders.refined;
+    let (refined, _) = refine_into(&survey, &overlay, &options, out, record, None, terminal)?;
     if !arguments.json {
         print_summary(&refined, terminal);
     }

@@ -11,6 +11,7 @@ pub mod gyro;
 pub mod init;
 pub mod locate;
 pub mod locate_points;
+pub mod overlay;
 pub mod plan;
 pub mod project;
 pub mod refine;

@@ -1,6 +1,7 @@
 //! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
 
 use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
+use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::commands::refine_files::refine_into;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::persist::atomic;
@@ -184,7 +185,8 @@ pub fn run(
 ) -> Result<(), Failure> {
     let options = arguments.options();
     let points = arguments.points.as_deref();
-    let survey = (arguments.reading).open(&arguments.survey, points, terminal)?;
+    let mut survey = (arguments.reading).open(&arguments.survey, points, terminal)?;
+    let overlay = leave_out_overlay(&mut survey, arguments.json, terminal)?;
     let inputs = record::hash_survey(&survey, None)?;
     let origin = resume::origin(&survey, &options, inputs.clone())?;
     let say = |text: &str| {
@@ -197,6 +199,7 @@ pub fn run(
     let (refined, json) = arguments.resume.run(&result, &origin, say, |checkpoint| {
         let done = refine_into(
             &survey,
+            &overlay,
             &options,
             &arguments.out,
             record,

@@ -5,6 +5,7 @@ use crate::cli::output::{Failure, RunRecord, Terminal, json};
 use crate::evaluate::deformation::{
     ShapeEstimate, deviation_sigmas_m, measure_sections, sections_csv,
 };
+use crate::frames::{PictureFormat, write_picture};
 use crate::persist::atomic;
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
@@ -12,10 +13,11 @@ use crate::refine::{
     EstimatedShape, RefineInput, RefineOptions, RefineReport, Refined, WallPoints,
     refine_with_checkpoint,
 };
-use crate::report::{REFINEMENT_FILE, SECTIONS_FILE};
+use crate::report::{OVERLAY_FILE, REFINEMENT_FILE, SECTIONS_FILE};
 use crate::surface::Bend;
 use crate::survey::{
-    FoundFiles, MASKED_FILE, MaskedWall, SURVEY_FILE, ShapeFile, Survey, SurveyFile,
+    FoundFiles, MASKED_FILE, MaskedWall, Overlay, OverlayReport, SURVEY_FILE, ShapeFile, Survey,
+    SurveyFile,
 };
 use crate::trajectory::tum;
 use serde::Serialize;
@@ -40,18 +42,22 @@ struct RefineFile<'a> {
     survey_file: &'a SurveyFile,
     /// The effective options.
     options: &'a RefineOptions,
+    /// Pixels that do not move with the wall.
+    overlay: &'a OverlayReport,
     #[serde(flatten)]
     report: &'a RefineReport,
 }
 
 /// Refines a survey, continuing from a checkpoint if there is one, and writes poses.tum,
-/// refine.json and covariance.csv into `out`, shape.json and sections.csv if the wall is deformed.
+/// refine.json and covariance.csv into `out`, shape.json and sections.csv if the wall is deformed,
+/// overlay.png if `overlay` has a mask.
 /// Also returns the text of refine.json.
 ///
 /// # Errors
 /// Bad input, or an output that cannot be written.
 pub fn refine_into(
     survey: &Survey,
+    overlay: &Overlay,
     options: &RefineOptions,
     out: &Path,
     record: &RunRecord,
@@ -73,6 +79,7 @@ pub fn refine_into(
         survey: &survey.folder,
         survey_file: &survey.file,
         options,
+        overlay: &overlay.report,
         report: &refined.report,
     })?;
     atomic::write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
@@ -88,6 +95,7 @@ pub fn refine_into(
         &refined.covariances.csv(&sigmas),
     )?;
     write_masked_wall(refined.masked.as_ref(), out)?;
+    write_overlay(overlay, out)?;
     write_survey(survey, &refined, out)?;
     Ok((refined, json))
 }
@@ -103,6 +111,19 @@ fn write_masked_wall(masked: Option<&MaskedWall>, out: &Path) -> Result<(), Fail
             })?;
             Ok(atomic::write_text(&path, &(text + "\n"))?)
         }
+        None => Ok(atomic::remove_file(&path)?),
+    }
+}
+
+/// Writes the mask of what does not move with the wall; removes that of an earlier run.
+fn write_overlay(overlay: &Overlay, out: &Path) -> Result<(), Failure> {
+    let path = out.join(OVERLAY_FILE);
+    match &overlay.mask {
+        Some(mask) => Ok(write_picture(
+            &path,
+            &mask.picture().into(),
+            PictureFormat::Png,
+        )?),
         None => Ok(atomic::remove_file(&path)?),
     }
 }

@@ -1,6 +1,7 @@
 //! `tunnelstitch report`: writes an HTML report of a refined survey.
 
 use crate::cli::arguments::{PoseReadingArguments, positive};
+use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::evaluate::compare_survey;
 use crate::persist::atomic::{self, StagedFolder};
@@ -48,10 +49,12 @@ pub fn run(
     record: &RunRecord,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    let survey = arguments
-        .reading
-        .open_beside(&arguments.survey, &arguments.refined, terminal)?;
+    let mut survey =
+        arguments
+            .reading
+            .open_beside(&arguments.survey, &arguments.refined, terminal)?;
     let refined = RefinedFiles::read(&survey, &arguments.refined)?;
+    leave_out_overlay(&mut survey, arguments.json, terminal)?;
     let px_per_metre = match arguments.px_per_metre {
         Some(px_per_metre) => Some(px_per_metre),
         None => report::choose_resolution(&survey, &refined.poses)?,

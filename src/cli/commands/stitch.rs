@@ -4,6 +4,7 @@ use crate::cli::arguments::{
     BlendArguments, OutputArguments, PictureArguments, PosesArguments, ResumeArguments,
     memory_size, resume,
 };
+use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{Failure, RunRecord, Terminal, json, record};
 use crate::evaluate::deformation::DeviationMap;
 use crate::persist::checkpoint::Checkpoint;
@@ -100,8 +101,9 @@ pub fn run(
 ) -> Result<(), Failure> {
     let output = &arguments.output;
     output.check_names()?;
-    let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
+    let (mut survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
     output.check_overwriting(&survey)?;
+    leave_out_overlay(&mut survey, arguments.json, terminal)?;
     let run = StitchRun {
         arguments,
         survey: &survey,

@@ -1,9 +1,10 @@
 //! Headline and key figures of the result.
 
-use super::page_data::PageData;
+use super::page_data::{PageData, data_uri};
 use crate::evaluate::Scores;
 use crate::report::model::{Report, ResultSummary};
 use crate::report::quantity::{count, length_unit, maybe, short};
+use crate::report::refined_files::OVERLAY_FILE;
 use maud::{Markup, html};
 
 /// Draws title and headline.
@@ -66,6 +67,13 @@ pub fn section(data: &PageData) -> Markup {
                 }
                 @if let Some(points) = &refinement.points {
                     p.note { (sentence(&points.sentence())) }
+                }
+                @if let Some(words) = refinement.overlay.as_ref().and_then(|o| o.sentence()) {
+                    p.note { (sentence(&words)) }
+                    @if let Some(bytes) = data.pictures.get(OVERLAY_FILE) {
+                        img width="160" alt="Pixels that do not move with the wall, in black"
+                            src=(data_uri("image/png", bytes));
+                    }
                 }
                 @for finding in &refinement.prior_test.findings {
                     p.note { (sentence(finding)) }

@@ -34,6 +34,15 @@ impl FrameSet {
         self.mask.as_ref()
     }
 
+    /// Also hides the pixels of `mask`.
+    pub fn hide(&mut self, mask: &Mask) {
+        let united = match &self.mask {
+            Some(own) => own.union(mask),
+            None => mask.clone(),
+        };
+        self.mask = Some(Arc::new(united));
+    }
+
     /// The frames of the given indices, renumbered.
     pub fn only(&self, indices: &[usize]) -> Self {
         let chosen = indices.iter().filter_map(|k| self.files.get(*k));

@@ -4,7 +4,7 @@
 use super::error::FrameError;
 use super::grey::GreyImage;
 use super::picture_decoder::open_picture;
-use image::{DynamicImage, ImageDecoder, ImageError};
+use image::{DynamicImage, GrayImage, ImageDecoder, ImageError, Luma};
 use std::path::Path;
 use std::sync::Arc;
 use tunnelstitch_geometry::camera::Camera;
@@ -158,6 +158,25 @@ impl Mask {
         }
     }
 
+    /// The mask that hides the pixels of both masks.
+    ///
+    /// # Panics
+    /// If the masks have different sizes.
+    pub fn union(&self, other: &Self) -> Self {
+        let pixels = self.distance_px.iter().zip(&other.distance_px);
+        let wall: Vec<bool> = pixels.map(|(a, b)| *a > 0 && *b > 0).collect();
+        Self::new(self.width, self.height, &wall)
+    }
+
+    /// The mask as a picture: black where the wall is hidden, white elsewhere.
+    pub fn picture(&self) -> GrayImage {
+        let (width, height) = (self.width as u32, self.height as u32);
+        GrayImage::from_fn(width, height, |u, v| {
+            let distance = self.distance_px[v as usize * self.width + u as usize];
+            Luma([if distance > 0 { u8::MAX } else { 0 }])
+        })
+    }
+
     /// Fraction of masked pixels.
     pub fn masked_fraction(&self) -> f64 {
         self.hidden as f64 / self.distance_px.len().max(1) as f64
@@ -235,7 +254,7 @@ impl PyramidMask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage, RgbaImage};
+    use image::{Rgb, RgbImage, RgbaImage};
 
     /// Two bars and a dot, compared with a brute-force distance.
     #[test]
@@ -279,6 +298,15 @@ mod tests {
         let mut image = GreyImage::new(3, 1, vec![5.0; 3]);
         mask.blank(&mut image);
         assert!(image.at(1, 0).is_nan() && image.at(0, 0) == 5.0 && image.at(2, 0) == 5.0);
+    }
+
+    #[test]
+    fn masks_unite_and_are_pictures_of_themselves() {
+        let first = Mask::new(3, 1, &[true, false, true]);
+        let second = Mask::new(3, 1, &[true, true, false]);
+        let both = first.union(&second);
+        assert_eq!(both, Mask::new(3, 1, &[true, false, false]));
+        assert_eq!(both.picture().into_raw(), [255, 0, 0]);
     }
 
     #[test]

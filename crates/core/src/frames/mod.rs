@@ -1,6 +1,7 @@
-//! Frames: reading, grey images, pyramids, masks, noise and writing of pictures.
+//! Frames: reading, grey images, pyramids, masks, static pixels, noise and writing of pictures.
 
 mod cache;
+mod combing;
 mod decode;
 mod error;
 mod frame_file;
@@ -14,11 +15,13 @@ mod noise;
 mod picture_decoder;
 mod pyramid;
 mod shading;
+mod static_pixels;
 mod stored_frame;
 mod video;
 mod write;
 
 pub use cache::{FrameCache, Light};
+pub use combing::comb_ratio;
 pub use decode::{colour_type, load_colour};
 pub use error::FrameError;
 pub use frame_file::{FrameFile, list_frames};
@@ -33,6 +36,9 @@ pub use noise::{noise_at_level, noise_sigma};
 pub use picture_decoder::open_picture;
 pub use pyramid::Pyramid;
 pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
+pub use static_pixels::{
+    MotionCell, MotionField, StaticPixels, TemporalStatistics, find_static_pixels,
+};
 pub use stored_frame::StoredFrame;
 pub use video::Video;
 pub use write::{FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};

@@ -67,6 +67,16 @@ impl StoredFrame {
         GreyImage::new(self.width, self.height, data)
     }
 
+    /// Converts to grey levels, 0 to 255, as [`StoredFrame::grey`] does, but clipped pixels keep
+    /// their values.
+    pub fn grey_with_clipped(&self) -> GreyImage {
+        let data = match &self.values {
+            Values::Eight(values) => values.iter().map(|v| f32::from(*v)).collect(),
+            Values::Sixteen(values) => values.iter().map(|v| f32::from(*v) / 257.0).collect(),
+        };
+        GreyImage::new(self.width, self.height, data)
+    }
+
     /// Memory in use, bytes.
     pub fn bytes(&self) -> usize {
         match &self.values {
@@ -82,13 +92,16 @@ mod tests {
     use crate::frames::write::{PictureFormat, write_picture};
     use image::ImageBuffer;
 
-    fn grey_of(picture: &DynamicImage) -> GreyImage {
+    fn stored(picture: &DynamicImage) -> StoredFrame {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("frame.png");
         write_picture(&path, picture, PictureFormat::Png).unwrap();
         let file = FrameFile::picture(0, path);
-        let stored = StoredFrame::decode(&file, picture.width(), picture.height()).unwrap();
-        stored.grey()
+        StoredFrame::decode(&file, picture.width(), picture.height()).unwrap()
+    }
+
+    fn grey_of(picture: &DynamicImage) -> GreyImage {
+        stored(picture).grey()
     }
 
     #[test]
@@ -105,6 +118,15 @@ mod tests {
         for level in 1..255u16 {
             assert_eq!(grey.data()[usize::from(257 * level)], f32::from(level));
         }
+    }
+
+    #[test]
+    fn clipped_pixels_can_keep_their_values() {
+        let ramp = image::GrayImage::from_fn(256, 1, |u, _| image::Luma([u as u8]));
+        let values: Vec<f32> = (0..256).map(|value| value as f32).collect();
+        assert_eq!(stored(&ramp.into()).grey_with_clipped().data(), values);
+        let sixteen = ImageBuffer::from_fn(256, 1, |u, _| image::Luma([257 * u as u16]));
+        assert_eq!(stored(&sixteen.into()).grey_with_clipped().data(), values);
     }
 
     #[test]

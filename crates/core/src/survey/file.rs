@@ -101,6 +101,19 @@ pub struct FramesSection {
     /// [`crate::frames::Mask`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mask: Option<PathBuf>,
+    /// Use of pixels that do not move with the wall; they are left out by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub overlay: Option<OverlayUse>,
+}
+
+/// `overlay`: use of pixels that do not move with the wall.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OverlayUse {
+    /// They are left out.
+    LeaveOut,
+    /// They are not sought, and used as all others.
+    Keep,
 }
 
 /// `[prior]`: the noise model of the initial poses.
@@ -204,6 +217,7 @@ mod tests {
                 angle_step_deg: Some(15.0),
                 times: Some("times.txt".into()),
                 mask: Some("mask.png".into()),
+                overlay: Some(OverlayUse::Keep),
             },
             poses: PosesSection {
                 format: Some(PoseFormat::Csv),

@@ -26,6 +26,7 @@
 //! # angle_step_deg = 15.0     # keyframes by rotation of the view; needs associate = "time"
 //! times = "times.txt"         # optional: lines `time`, `time name` or `name time`
 //! mask = "mask.png"           # optional: an image, black where the wall is hidden
+//! overlay = "keep"            # optional: also uses what does not move with the wall
 //!
 //! [poses]
 //! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC: see the content
@@ -84,6 +85,8 @@ mod ignore;
 mod keyframe_selection;
 mod masked_wall;
 mod open;
+mod overlay;
+mod picture_motion;
 mod pose_reader;
 mod pose_validation;
 mod poses_section;
@@ -99,12 +102,13 @@ pub use calibrated::FoundFiles;
 pub use capture_times::FrameTimes;
 pub use discover::{Discovery, PictureGroup, VideoChoice};
 pub use error::SurveyError;
-pub use file::{CameraSection, FramesSection, PriorSection, SURVEY_FILE, SurveyFile};
+pub use file::{CameraSection, FramesSection, OverlayUse, PriorSection, SURVEY_FILE, SurveyFile};
 pub use frame_times::read_frame_times;
 pub use ignore::IgnoreSection;
 pub use masked_wall::{MASKED_FILE, MaskedTile, MaskedWall};
 pub use open::Survey;
 pub use open::toml_path;
+pub use overlay::{Overlay, OverlayReport};
 pub use poses_section::PosesSection;
 pub use shape_file::ShapeFile;
 pub use tunnel::{DEFAULT_SHAPE_SIGMA_RADII, Shape, TunnelSection, read_centreline};
