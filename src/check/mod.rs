@@ -21,7 +21,7 @@ mod run;
 mod statistics;
 mod warnings;
 
-pub use effort::Effort;
+pub use effort::{Effort, refine_bytes};
 pub use jitter::JitterCheck;
 pub use masks::MaskCheck;
 pub use overlap::OverlapCheck;

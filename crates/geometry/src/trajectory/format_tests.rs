@@ -34,7 +34,7 @@ fn written(trajectory: &[StampedPose]) -> Vec<(PoseFormat, String)> {
         (PoseFormat::Csv, csv::format(&names, trajectory)),
         (
             PoseFormat::Colmap,
-            colmap::format_images(&names, trajectory),
+            colmap::format_images(&names, trajectory).unwrap(),
         ),
         (
             PoseFormat::Nerfstudio,
