@@ -20,7 +20,7 @@ fn read_text(text: &str) -> Result<PoseFile, PoseError> {
 
 fn names(count: usize) -> Vec<String> {
     (0..count)
-        .map(|k| format!("frames/a, \"{k}\".png"))
+        .map(|k| format!("frames/a,\"{k}\".png"))
         .collect()
 }
 
