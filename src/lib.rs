@@ -70,7 +70,7 @@
 //! | in | lowest first |
 //! | --- | --- |
 //! | `crates` | `geometry` < `core` < `photometry` < `refine`, `render`, `simulate` < `evaluate` < `src` |
-//! | `crates/geometry` | `numerics` < `camera` < `trajectory` < `surface` |
+//! | `crates/geometry` | `files`, `numerics` < `camera` < `trajectory` < `surface` |
 //! | `crates/core` | `bitmap_text`, `colour_map`, `persist`, `points`, `progress` < `raster`, `frames` < `survey`, `test_wall` < `super_resolve` |
 //! | `crates/refine` | `thresholds`, `options` < `parameters` < `linear` < `points` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `point_fit` < `tracking` < `validation` < `uncertainty` < `verdict` < `report` < `refined` < `stages` < `pipeline` < `pose_convention_search` |
 //! | `crates/render` | `error` < `layout` < `warp` < `sampling` < `compositing` < `output` |
@@ -143,7 +143,7 @@ pub mod report;
 
 pub use tunnelstitch_core::{frames, persist, progress, raster, super_resolve, survey};
 pub use tunnelstitch_evaluate as evaluate;
-pub use tunnelstitch_geometry::{camera, surface, trajectory};
+pub use tunnelstitch_geometry::{camera, files, surface, trajectory};
 pub use tunnelstitch_refine as refine;
 pub use tunnelstitch_render as render;
 pub use tunnelstitch_simulate as simulate;

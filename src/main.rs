@@ -1,20 +1,38 @@
 //! The `tunnelstitch` program: starts the command line and maps errors to exit codes.
 
 use std::process::ExitCode;
+use tunnelstitch::cli::print_error;
 
 fn main() -> ExitCode {
     // A panic in any thread is a bug and ends the program with the exit code of bugs.
     std::panic::set_hook(Box::new(|panic| {
         tunnelstitch::persist::remove_unfinished();
-        eprintln!("bug in tunnelstitch {}: {panic}", env!("CARGO_PKG_VERSION"));
-        eprintln!("please report it with the command line and, if you can, the survey");
+        print_error(&format!(
+            "bug in tunnelstitch {}: {panic}\nplease report it with the command line and, if you \
+             can, the survey",
+            env!("CARGO_PKG_VERSION")
+        ));
         std::process::exit(1);
     }));
+    block_file_size_signal();
     match tunnelstitch::cli::run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("error: {}", failure.message);
+            print_error(&format!("error: {}", failure.message));
             ExitCode::from(failure.code)
         }
     }
 }
+
+/// Blocks the signal of a file that reaches the limit of its size (`ulimit -f`), in this thread and
+/// in those that it starts: writing fails instead, as on a full disk.
+#[cfg(unix)]
+fn block_file_size_signal() {
+    let mut signals = nix::sys::signal::SigSet::empty();
+    signals.add(nix::sys::signal::Signal::SIGXFSZ);
+    // Without it, the program ends by the signal.
+    let _ = signals.thread_block();
+}
+
+#[cfg(not(unix))]
+fn block_file_size_signal() {}

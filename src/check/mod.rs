@@ -24,7 +24,7 @@ mod run;
 mod statistics;
 mod warnings;
 
-pub use effort::Effort;
+pub use effort::{Effort, refine_bytes};
 pub use interlacing::interlacing_warning;
 pub use jitter::JitterCheck;
 pub use masks::MaskCheck;

@@ -1,6 +1,7 @@
 //! Exposure, noise and texture of a dozen frames.
 
 use super::statistics::median_or_zero;
+use crate::files::printed;
 use crate::frames::{FrameFile, GreyImage, StoredFrame, noise_sigma};
 use crate::survey::Survey;
 use rayon::prelude::*;
@@ -90,7 +91,7 @@ impl PictureCheck {
 
 /// Fault of a frame that its file's header shows.
 fn header_fault(file: &FrameFile, size: [u32; 2]) -> Option<String> {
-    let name = format!("frame {} ({})", file.index, file.path.display());
+    let name = format!("frame {} ({})", file.index, printed(&file.path));
     match file.size() {
         Err(error) => Some(error.to_string()),
         Ok((width, height)) if [width, height] != size => Some(format!(

@@ -9,6 +9,7 @@ use super::pictures::PictureCheck;
 use super::poses::PosesCheck;
 use super::result::Check;
 use super::warnings::warnings;
+use crate::refine::is_motionless;
 use crate::render::native_px_per_metre;
 use crate::surface::SurfaceError;
 use crate::survey::{Overlay, Survey};
@@ -42,6 +43,13 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     };
     if survey.frames.len() < 2 {
         faults.push("there is one frame; refine needs two that overlap".to_owned());
+    }
+    if survey.frames.len() > 1 && is_motionless(&survey.initial) {
+        faults.push(
+            "all initial poses are equal; refine needs the motion of the camera (tunnelstitch plan \
+             and gyro write poses)"
+                .to_owned(),
+        );
     }
     let mut check = Check {
         frames: survey.frames.len(),

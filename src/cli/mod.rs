@@ -14,5 +14,5 @@ mod configuration;
 mod output;
 mod program;
 
-pub use output::{Failure, Terminal};
+pub use output::{Failure, Terminal, print_error};
 pub use program::run;

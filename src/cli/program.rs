@@ -5,7 +5,7 @@ use super::commands::{
     refine, report, shell, simulate, stitch, view,
 };
 use super::configuration;
-use super::output::{Failure, RunRecord, Terminal};
+use super::output::{Failure, RunRecord, Terminal, print_error};
 use crate::persist::atomic;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::sync::Arc;
@@ -78,12 +78,16 @@ pub fn run() -> Result<(), Failure> {
         arguments: command_line(),
         options: configuration::options_table(&parsed.options),
     };
-    if let Some(threads) = cli.global.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(threads))
-            .build_global()
-            .map_err(|error| Failure::bug(format!("cannot start {threads} threads: {error}")))?;
-    }
+    // 0 is one thread for each core.
+    let threads = cli.global.threads.map_or(0, usize::from);
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global()
+        .map_err(|error| {
+            Failure::temporary(format!(
+                "cannot start the threads: {error}; give fewer --threads, or end other programs"
+            ))
+        })?;
     handle_interrupts(&cli.command)?;
     let terminal = Arc::new(Terminal::new(cli.global.quiet));
     cli.command.run(&command, &record, &terminal)
@@ -95,7 +99,7 @@ fn handle_interrupts(command: &Command) -> Result<(), Failure> {
     ctrlc::set_handler(move || {
         atomic::remove_unfinished();
         if is_resumable {
-            eprintln!("interrupted; the same command continues from here");
+            print_error("interrupted; the same command continues from here");
         }
         std::process::exit(130);
     })

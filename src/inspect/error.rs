@@ -1,5 +1,7 @@
 //! Errors of export and inspection.
 
+use crate::files::printed;
+use crate::inspect::mark::MarkVersions;
 use crate::persist::atomic::WriteError;
 use crate::raster::RasterError;
 use crate::render::RenderError;
@@ -14,7 +16,7 @@ pub enum InspectError {
     #[error(
         "{}: the pictures alone have {} MiB, and one file is to have no more than {} MiB; \
          use --3dtiles, which streams, or lower --px-per-metre",
-        path.display(), bytes >> 20, limit_bytes >> 20
+        printed(path), bytes >> 20, limit_bytes >> 20
     )]
     TooLong {
         /// The file.
@@ -25,15 +27,21 @@ pub enum InspectError {
         limit_bytes: u64,
     },
     /// A file of marks is invalid, or a mark cannot be saved.
-    #[error("{}: {what}; mend the file or move it away", path.display())]
+    #[error("{}: {what}; mend the file or move it away", printed(path))]
     Marks {
         /// The file.
         path: PathBuf,
         /// Description of the problem.
         what: String,
     },
+    /// Somebody else has changed the same mark.
+    #[error("the mark has been changed in the file meanwhile; load the page again")]
+    MarkConflict {
+        /// Both versions.
+        versions: Box<MarkVersions>,
+    },
     /// The folder to be shown cannot be read.
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {what}", printed(path))]
     Folder {
         /// The folder.
         path: PathBuf,

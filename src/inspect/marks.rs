@@ -4,9 +4,16 @@
 //! Coordinates are arc length and chainage on the unrolled wall, metres, as in a GeoTIFF of
 //! `stitch`, so that both coincide in a GIS.
 
+use crate::files::limits::MAX_MARKS_BYTES;
+use crate::files::read_text;
 use crate::inspect::error::InspectError;
+use crate::inspect::mark::{Mark, MarkVersions};
 use crate::persist::atomic;
+use crate::trajectory::csv::to_cell;
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::fs::File;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Name of the GeoJSON file of a survey's marks.
@@ -16,145 +23,46 @@ pub const MARKS_CSV: &str = "marks.csv";
 
 /// Maximum marks of a survey, which no inspector exceeds by hand.
 const MAX_MARKS: usize = 100_000;
-/// Maximum characters of a text in a mark.
-const MAX_CHARACTERS: usize = 10_000;
-
-/// Mark of a defect, a GeoJSON feature.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Mark {
-    #[serde(rename = "type")]
-    kind: FeatureKind,
-    /// Identifier of the mark: letters, digits, `-`.
-    pub id: String,
-    /// Point, or line between two points.
-    pub geometry: Geometry,
-    /// Attributes of the defect.
-    pub properties: Properties,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-enum FeatureKind {
-    Feature,
-}
-
-/// Position on the unrolled wall: arc length and chainage, metres.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "type", content = "coordinates")]
-pub enum Geometry {
-    /// A point.
-    Point([f64; 2]),
-    /// A measured line. Arc lengths may exceed the perimeter, so that the line takes the shorter
-    /// way around.
-    LineString([[f64; 2]; 2]),
-}
-
-/// Attributes of a defect and its position in an inspector's terms.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Properties {
-    /// Defect code, as of EN 13508-2 (`BAB` for a crack), or any text.
-    pub class: String,
-    /// Severity, 1 (slight) to 5 (severe).
-    pub severity: u8,
-    /// A remark.
-    pub note: String,
-    /// Chainage, metres.
-    pub chainage_m: f64,
-    /// Clock position, hours and minutes.
-    pub clock: String,
-    /// Angle θ, degrees.
-    pub theta_deg: f64,
-    /// World coordinate x, metres.
-    pub x_m: f64,
-    /// World coordinate y, metres.
-    pub y_m: f64,
-    /// World coordinate z, metres.
-    pub z_m: f64,
-    /// Chainage of the other end, metres.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub end_chainage_m: Option<f64>,
-    /// Clock position of the other end.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub end_clock: Option<String>,
-    /// Length along the wall, metres.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub length_m: Option<f64>,
-    /// Width of a crack, millimetres.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub width_mm: Option<f64>,
-    /// The layer in which it was marked.
-    pub layer: String,
-    /// Time of creation, RFC 3339.
-    pub created: String,
-}
-
 /// Content of the GeoJSON file.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Collection {
     #[serde(rename = "type")]
     kind: CollectionKind,
     features: Vec<Mark>,
+    /// Members of other programs, as `name` and `crs` (RFC 7946, section 6.1), kept as they are.
+    #[serde(flatten)]
+    foreign: Map<String, Value>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 enum CollectionKind {
     FeatureCollection,
 }
 
-impl Mark {
-    /// Validates the mark.
-    ///
-    /// # Errors
-    /// A description of the first invalid value.
-    pub fn validate(&self) -> Result<(), &'static str> {
-        let p = &self.properties;
-        let name = |c: char| c.is_ascii_alphanumeric() || c == '-';
-        let numbers = [p.chainage_m, p.theta_deg, p.x_m, p.y_m, p.z_m];
-        let optional = [p.end_chainage_m, p.length_m, p.width_mm];
-        let places = match &self.geometry {
-            Geometry::Point(place) => vec![*place],
-            Geometry::LineString(places) => places.to_vec(),
-        };
-        let all = numbers
-            .into_iter()
-            .chain(optional.into_iter().flatten())
-            .chain(places.into_iter().flatten());
-        let texts = [&p.class, &p.note, &p.clock, &p.layer, &p.created];
-        let wrong = [
-            (
-                !(1..=64).contains(&self.id.len()) || !self.id.chars().all(name),
-                "its id must be 1 to 64 letters, digits or -",
-            ),
-            (
-                !(1..=5).contains(&p.severity),
-                "its severity must be 1 to 5",
-            ),
-            (
-                all.into_iter().any(|v| !v.is_finite()),
-                "a number of it is not finite",
-            ),
-            (
-                texts
-                    .into_iter()
-                    .chain(&p.end_clock)
-                    .any(|text| text.chars().count() > MAX_CHARACTERS),
-                "a text of it is too long",
-            ),
-        ];
-        match wrong.iter().find(|(wrong, _)| *wrong) {
-            Some((_, what)) => Err(what),
-            None => Ok(()),
+impl Collection {
+    fn empty() -> Self {
+        Self {
+            kind: CollectionKind::FeatureCollection,
+            features: Vec::new(),
+            foreign: Map::new(),
         }
+    }
+
+    /// The mark with an identifier.
+    fn find(&self, id: &str) -> Option<&Mark> {
+        self.features.iter().find(|mark| mark.id == id)
     }
 }
 
 /// Marks of a survey and their files.
+///
+/// The files may change meanwhile, by another `view` or an editor. Before each change they are read
+/// again: changes of other marks are kept, and one of the same mark is a conflict.
 #[derive(Debug)]
 pub struct Marks {
     folder: PathBuf,
-    marks: Vec<Mark>,
+    /// Content of the GeoJSON file as last read or written.
+    content: Collection,
 }
 
 impl Marks {
@@ -163,30 +71,9 @@ impl Marks {
     /// # Errors
     /// [`InspectError::Marks`] for an invalid file.
     pub fn open(folder: &Path) -> Result<Self, InspectError> {
-        let path = folder.join(MARKS_GEOJSON);
-        let fail = |what: String| InspectError::Marks {
-            path: path.clone(),
-            what,
-        };
-        let marks = match std::fs::read_to_string(&path) {
-            Ok(text) => {
-                let collection: Collection =
-                    serde_json::from_str(&text).map_err(|error| fail(error.to_string()))?;
-                if let Some((mark, what)) = collection
-                    .features
-                    .iter()
-                    .find_map(|mark| Some((mark, mark.validate().err()?)))
-                {
-                    return Err(fail(format!("mark {}: {what}", mark.id)));
-                }
-                collection.features
-            }
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
-            Err(error) => return Err(fail(error.to_string())),
-        };
         Ok(Self {
             folder: folder.to_owned(),
-            marks,
+            content: read_marks(&folder.join(MARKS_GEOJSON))?,
         })
     }
 
@@ -195,11 +82,11 @@ impl Marks {
     /// # Errors
     /// [`InspectError::Marks`] if they cannot be encoded.
     pub fn geojson(&self) -> Result<String, InspectError> {
-        let collection = Collection {
-            kind: CollectionKind::FeatureCollection,
-            features: self.marks.clone(),
-        };
-        serde_json::to_string_pretty(&collection)
+        self.encode(&self.content)
+    }
+
+    fn encode(&self, content: &Collection) -> Result<String, InspectError> {
+        serde_json::to_string_pretty(content)
             .map(|text| text + "\n")
             .map_err(|error| self.fail(MARKS_GEOJSON, error.to_string()))
     }
@@ -209,52 +96,80 @@ impl Marks {
     /// If that fails, the marks are unchanged.
     ///
     /// # Errors
-    /// [`InspectError::Marks`] for an invalid mark; [`InspectError::Write`].
+    /// [`InspectError::Marks`] for an invalid mark, or a file that has become invalid;
+    /// [`InspectError::MarkConflict`]; [`InspectError::Write`].
     pub fn put(&mut self, mark: Mark) -> Result<(), InspectError> {
         if let Err(what) = mark.validate() {
             return Err(self.fail(MARKS_GEOJSON, what.to_owned()));
         }
-        let mut marks = self.marks.clone();
-        match marks.iter().position(|other| other.id == mark.id) {
-            Some(place) => marks[place] = mark,
-            None => marks.push(mark),
-        }
-        if marks.len() > MAX_MARKS {
-            let what = format!("no more than {MAX_MARKS} marks are kept");
-            return Err(self.fail(MARKS_GEOJSON, what));
-        }
-        self.replace(marks)
+        self.change(mark.id.clone(), Some(mark))
     }
 
     /// Removes the mark with an identifier, if it exists, and writes the files.
     ///
     /// # Errors
-    /// [`InspectError::Write`].
+    /// The errors of [`Marks::put`].
     pub fn remove(&mut self, id: &str) -> Result<(), InspectError> {
-        let others = self.marks.iter().filter(|mark| mark.id != id);
-        self.replace(others.cloned().collect())
+        self.change(id.to_owned(), None)
     }
 
-    fn replace(&mut self, marks: Vec<Mark>) -> Result<(), InspectError> {
-        let before = std::mem::replace(&mut self.marks, marks);
-        self.write().inspect_err(|_| self.marks = before)
+    /// Replaces the mark with an identifier by another one, or by none, in the files as they are
+    /// now.
+    fn change(&mut self, id: String, mark: Option<Mark>) -> Result<(), InspectError> {
+        let _lock = lock_folder(&self.folder);
+        let mut content = read_marks(&self.folder.join(MARKS_GEOJSON))?;
+        let saved = content.find(&id);
+        if saved != self.content.find(&id) && saved != mark.as_ref() {
+            let versions = Box::new(MarkVersions {
+                error: "the mark has been changed in the file meanwhile",
+                saved: saved.cloned(),
+                sent: mark,
+            });
+            // The next change starts from what the file has.
+            self.content = content;
+            return Err(InspectError::MarkConflict { versions });
+        }
+        let place = content.features.iter().position(|other| other.id == id);
+        match (place, mark) {
+            (Some(place), Some(mark)) => content.features[place] = mark,
+            (Some(place), None) => drop(content.features.remove(place)),
+            (None, Some(mark)) => content.features.push(mark),
+            (None, None) => {}
+        }
+        if content.features.len() > MAX_MARKS {
+            let what = format!("no more than {MAX_MARKS} marks are kept");
+            return Err(self.fail(MARKS_GEOJSON, what));
+        }
+        self.write(&content)?;
+        self.content = content;
+        Ok(())
     }
 
-    fn write(&self) -> Result<(), InspectError> {
-        let (geojson, csv) = (self.geojson()?, self.csv()?);
-        atomic::write_text(&self.folder.join(MARKS_GEOJSON), &geojson)?;
-        Ok(atomic::write_text(&self.folder.join(MARKS_CSV), &csv)?)
+    /// Writes both files. The GeoJSON file, which is read again, is the last: if the table cannot
+    /// be written, it is unchanged.
+    fn write(&self, content: &Collection) -> Result<(), InspectError> {
+        let (geojson, csv) = (self.encode(content)?, self.csv(content)?);
+        atomic::write_text(&self.folder.join(MARKS_CSV), &csv)?;
+        let written = atomic::write_text(&self.folder.join(MARKS_GEOJSON), &geojson);
+        if written.is_err() {
+            // The table goes back to what the other file has. The first failure is reported.
+            if let Ok(before) = self.csv(&self.content) {
+                let _ = atomic::write_text(&self.folder.join(MARKS_CSV), &before);
+            }
+        }
+        Ok(written?)
     }
 
     /// Encodes the marks as CSV, in order of chainage.
-    fn csv(&self) -> Result<String, InspectError> {
+    fn csv(&self, content: &Collection) -> Result<String, InspectError> {
         let fail = |error: String| self.fail(MARKS_CSV, error);
-        let mut marks: Vec<&Mark> = self.marks.iter().collect();
+        let mut marks: Vec<&Mark> = content.features.iter().collect();
         marks.sort_by(|a, b| a.properties.chainage_m.total_cmp(&b.properties.chainage_m));
         let mut table = csv::Writer::from_writer(Vec::new());
         let number = |value: Option<f64>, digits: usize| {
             value.map_or(String::new(), |v| format!("{v:.digits$}"))
         };
+        let text = |text: &str| to_cell(text).into_owned();
         let head = [
             "id",
             "class",
@@ -281,22 +196,22 @@ impl Marks {
         } in marks
         {
             let record = [
-                id.clone(),
-                p.class.clone(),
+                text(id),
+                text(&p.class),
                 p.severity.to_string(),
                 number(Some(p.chainage_m), 4),
-                p.clock.clone(),
+                text(&p.clock),
                 number(Some(p.theta_deg), 3),
                 number(p.end_chainage_m, 4),
-                p.end_clock.clone().unwrap_or_default(),
+                text(p.end_clock.as_deref().unwrap_or_default()),
                 number(p.length_m, 4),
                 number(p.width_mm, 2),
                 number(Some(p.x_m), 4),
                 number(Some(p.y_m), 4),
                 number(Some(p.z_m), 4),
-                p.note.clone(),
-                p.layer.clone(),
-                p.created.clone(),
+                text(&p.note),
+                text(&p.layer),
+                text(&p.created),
             ];
             table
                 .write_record(record)
@@ -314,6 +229,34 @@ impl Marks {
             what,
         }
     }
+}
+
+/// Reads a file of marks, with or without a byte order mark; empty if there is none.
+fn read_marks(path: &Path) -> Result<Collection, InspectError> {
+    let fail = |what: String| InspectError::Marks {
+        path: path.to_owned(),
+        what,
+    };
+    let text = match read_text(path, MAX_MARKS_BYTES) {
+        Ok(text) => text,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Collection::empty()),
+        Err(error) => return Err(fail(error.to_string())),
+    };
+    let content: Collection = serde_json::from_str(text.trim_start_matches('\u{feff}'))
+        .map_err(|error| fail(error.to_string()))?;
+    let mut marks = content.features.iter();
+    match marks.find_map(|mark| Some((mark, mark.validate().err()?))) {
+        Some((mark, what)) => Err(fail(format!("mark {:?}: {what}", mark.id))),
+        None => Ok(content),
+    }
+}
+
+/// Keeps other programs from changing the marks of a folder until the file is dropped; None where
+/// folders have no locks.
+fn lock_folder(folder: &Path) -> Option<File> {
+    let file = File::open(folder).ok()?;
+    file.lock().ok()?;
+    Some(file)
 }
 
 #[cfg(test)]
@@ -344,7 +287,7 @@ mod tests {
         marks.put(mark("a", 4.0)).unwrap();
         marks.remove("c").unwrap();
         let again = Marks::open(dir.path()).unwrap();
-        assert_eq!(again.marks, [mark("a", 4.0), mark("b", 3.0)]);
+        assert_eq!(again.content.features, [mark("a", 4.0), mark("b", 3.0)]);
         let table = std::fs::read_to_string(dir.path().join(MARKS_CSV)).unwrap();
         let rows: Vec<&str> = table.lines().collect();
         assert_eq!(rows.len(), 3);
@@ -376,5 +319,81 @@ mod tests {
         std::fs::write(dir.path().join(MARKS_GEOJSON), "{}").unwrap();
         let error = Marks::open(dir.path()).unwrap_err().to_string();
         assert!(error.contains("marks.geojson"), "{error}");
+    }
+
+    #[test]
+    fn changes_by_others_are_kept_and_conflicts_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let [mut one, mut two] = [(); 2].map(|()| Marks::open(dir.path()).unwrap());
+        one.put(mark("a", 1.0)).unwrap();
+        two.put(mark("b", 2.0)).unwrap();
+        one.put(mark("c", 3.0)).unwrap();
+        let ids = |marks: &Marks| -> Vec<String> {
+            marks
+                .content
+                .features
+                .iter()
+                .map(|mark| mark.id.clone())
+                .collect()
+        };
+        assert_eq!(ids(&Marks::open(dir.path()).unwrap()), ["a", "b", "c"]);
+        // The same mark, changed by both.
+        two.put(mark("b", 4.0)).unwrap();
+        let refused = one.put(mark("b", 5.0)).unwrap_err();
+        let InspectError::MarkConflict { versions } = refused else {
+            panic!("{refused}");
+        };
+        assert_eq!(versions.saved, Some(mark("b", 4.0)));
+        assert_eq!(versions.sent, Some(mark("b", 5.0)));
+        // Both are known now.
+        one.put(mark("b", 5.0)).unwrap();
+    }
+
+    #[test]
+    fn a_failed_write_changes_neither_file_nor_memory() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut marks = Marks::open(dir.path()).unwrap();
+        std::fs::create_dir(dir.path().join(MARKS_CSV)).unwrap();
+        assert!(marks.put(mark("a", 1.0)).is_err());
+        assert!(marks.content.features.is_empty());
+        assert!(!dir.path().join(MARKS_GEOJSON).exists());
+    }
+
+    #[test]
+    fn members_of_other_programs_are_kept() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(MARKS_GEOJSON);
+        let text = "\u{feff}{\"type\": \"FeatureCollection\", \"name\": \"marks\", \"crs\": {}, \
+                    \"features\": []}";
+        std::fs::write(&path, text).unwrap();
+        let mut marks = Marks::open(dir.path()).unwrap();
+        let mut other = serde_json::to_value(mark("a", 1.0)).unwrap();
+        other["bbox"] = serde_json::json!([0, 0, 1, 1]);
+        other["properties"]["fid"] = 7.into();
+        marks.put(serde_json::from_value(other).unwrap()).unwrap();
+        let read: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!(read["name"], "marks");
+        let feature = &read["features"][0];
+        assert_eq!(
+            (&feature["bbox"][3], &feature["properties"]["fid"]),
+            (&1.into(), &7.into())
+        );
+    }
+
+    #[test]
+    fn no_cell_of_the_table_is_a_formula() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut marks = Marks::open(dir.path()).unwrap();
+        let mut evil = mark("-a", -1.0);
+        evil.properties.class = "=HYPERLINK(\"x\")".to_owned();
+        evil.properties.note = "@SUM(1)".to_owned();
+        marks.put(evil).unwrap();
+        let table = std::fs::read_to_string(dir.path().join(MARKS_CSV)).unwrap();
+        let row = table.lines().nth(1).unwrap();
+        assert!(
+            row.starts_with("'-a,\"'=HYPERLINK(\"\"x\"\")\",3,-1.0000,"),
+            "{row}"
+        );
+        assert!(row.contains("'@SUM(1)"), "{row}");
     }
 }

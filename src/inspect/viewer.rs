@@ -1,5 +1,6 @@
 //! Page of the viewer, bundled by `build.rs`.
 
+use crate::files::write_without_links;
 use crate::inspect::error::InspectError;
 use crate::persist::atomic::WriteError;
 use std::path::Path;
@@ -46,7 +47,7 @@ impl Viewer {
         ];
         for (name, bytes) in files {
             let path = folder.join(name);
-            std::fs::write(&path, bytes).map_err(|source| WriteError::new(&path, source))?;
+            write_without_links(&path, bytes).map_err(|source| WriteError::new(&path, source))?;
         }
         Ok(())
     }

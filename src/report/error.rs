@@ -1,5 +1,6 @@
 //! Errors of a report's sources.
 
+use crate::files::printed;
 use crate::frames::FrameError;
 use crate::refine::CovarianceError;
 use crate::render::RenderError;
@@ -13,14 +14,14 @@ pub enum ReportError {
     /// The folder has no refined poses.
     #[error(
         "{}: holds no poses.tum; --refined is the folder that refine has written, or a TUM file",
-        path.display()
+        printed(path)
     )]
     NoPoses {
         /// The folder.
         path: PathBuf,
     },
     /// A file cannot be read.
-    #[error("{}: cannot read it: {source}", path.display())]
+    #[error("{}: cannot read it: {source}", printed(path))]
     Read {
         /// The file.
         path: PathBuf,
@@ -30,7 +31,7 @@ pub enum ReportError {
     /// `refine.json` is malformed, or of another version.
     #[error(
         "{}:{line}:{column}: {what}; refine the survey again with this version",
-        path.display()
+        printed(path)
     )]
     Parse {
         /// The file.
@@ -43,7 +44,7 @@ pub enum ReportError {
         what: String,
     },
     /// `sections.csv` is malformed.
-    #[error("{}: {what}; refine the survey again", path.display())]
+    #[error("{}: {what}; refine the survey again", printed(path))]
     Table {
         /// The file.
         path: PathBuf,
@@ -54,7 +55,7 @@ pub enum ReportError {
     #[error(
         "{}: has {found} frames, but the survey has {frames}; give the folder that refine has \
          written for this survey",
-        path.display()
+        printed(path)
     )]
     Count {
         /// The file.

@@ -9,6 +9,7 @@ use super::model::{
 use super::pictures::{Pictures, panoramas, thumbnails};
 use super::refined_files::{OVERLAY_FILE, REFINEMENT_FILE, RefinedFiles, Refinement};
 use crate::evaluate::{ComparedPanoramas, Comparison, SeamMap, WallError};
+use crate::files::printed;
 use crate::refine::FrameFlag;
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
@@ -97,8 +98,8 @@ fn survey_facts(survey: &Survey, refined_poses: &Path) -> SurveyFacts {
         name: name.map_or_else(String::new, |name| {
             name.as_os_str().to_string_lossy().into_owned()
         }),
-        folder: survey.folder.display().to_string(),
-        refined_poses: refined_poses.display().to_string(),
+        folder: printed(&survey.folder).to_string(),
+        refined_poses: printed(refined_poses).to_string(),
         frames: survey.frames.len(),
         frame_size_px: [survey.camera.width, survey.camera.height],
         perimeter_m: survey.surface.perimeter_m(),

@@ -2,6 +2,8 @@
 
 use super::error::ReportError;
 use crate::evaluate::deformation::{SectionDeformation, read_sections};
+use crate::files::limits::MAX_REPORT_BYTES;
+use crate::files::read_text;
 use crate::refine::{
     FrameReport, LengthScale, LevelReport, MaskedReport, PointsReport, PriorTest, ShapeReport,
     StageTime, SurveyVerdict, read_covariances,
@@ -186,7 +188,7 @@ impl RefinedFiles {
 }
 
 fn read_section_file(path: &Path) -> Result<Vec<SectionDeformation>, ReportError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ReportError::Read {
+    let text = read_text(path, MAX_REPORT_BYTES).map_err(|source| ReportError::Read {
         path: path.to_owned(),
         source,
     })?;
@@ -197,7 +199,7 @@ fn read_section_file(path: &Path) -> Result<Vec<SectionDeformation>, ReportError
 }
 
 fn read_refinement(path: &Path, frames: usize) -> Result<Refinement, ReportError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ReportError::Read {
+    let text = read_text(path, MAX_REPORT_BYTES).map_err(|source| ReportError::Read {
         path: path.to_owned(),
         source,
     })?;

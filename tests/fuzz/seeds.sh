@@ -148,13 +148,13 @@ mark='{"type": "Feature", "id": "a-1", "geometry": {"type": "Point", "coordinate
 seed marks one <<<"{\"type\": \"FeatureCollection\", \"features\": [$mark]}"
 seed marks none <<<'{"type": "FeatureCollection", "features": []}'
 request() { printf '%s HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nContent-Type: application/json\r\n%s\r\n' "$1" "${2:-}"; }
-request 'GET /' | seed requests page
-request 'GET /tile.webp' | seed requests tile
-request 'HEAD /api/marks' | seed requests marks
-request 'GET /api/frames/1' | seed requests frame
-request 'GET /api/sightings?layer=initial&s=1.5&h=0.1' | seed requests sightings
-{ request 'PUT /api/marks/a-1' "Content-Length: ${#mark}"$'\r\n'; printf %s "$mark"; } | seed requests put
-request 'DELETE /api/marks/a-1' | seed requests delete
+request 'GET /TOKEN/' | seed requests page
+request 'GET /TOKEN/tile.webp' | seed requests tile
+request 'HEAD /TOKEN/api/marks' | seed requests marks
+request 'GET /TOKEN/api/frames/1' | seed requests frame
+request 'GET /TOKEN/api/sightings?layer=initial&s=1.5&h=0.1' | seed requests sightings
+{ request 'PUT /TOKEN/api/marks/a-1' "Content-Length: ${#mark}"$'\r\n'; printf %s "$mark"; } | seed requests put
+request 'DELETE /TOKEN/api/marks/a-1' | seed requests delete
 seed video probed <<'END'
 {"packets": [{"pts": 0, "flags": "K_"}, {"pts": 60, "flags": "__"}, {"pts": 20, "flags": "_D"}], "streams": [{"width": 64,
  "height": 48, "pix_fmt": "yuv420p", "time_base": "1/600", "field_order": "progressive", "side_data_list": [{"rotation": -90}]}]}

@@ -396,3 +396,65 @@ fn what_is_wrong_with_a_video_is_said() {
         "{message}"
     );
 }
+
+/// Playlists name other files, which are not of the survey.
+#[test]
+fn lists_of_other_files_are_refused() {
+    if is_ffmpeg_missing() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let survey = simulated(dir.path());
+    into_video(&survey, "v.mkv", &LOSSLESS);
+    let outside = dir.path().join("secret.mkv");
+    std::fs::rename(survey.join("v.mkv"), &outside).unwrap();
+    let playlist = format!(
+        "#EXTM3U\n#EXT-X-TARGETDURATION:24\n#EXTINF:24,\n{}\n#EXT-X-ENDLIST\n",
+        text(&outside)
+    );
+    let concat = format!("ffconcat version 1.0\nfile '{}'\n", text(&outside));
+    for (name, content) in [("x.m3u8", playlist.as_str()), ("v.mkv", concat.as_str())] {
+        std::fs::write(survey.join(name), content).unwrap();
+        edit(
+            &survey.join("survey.toml"),
+            "video = \"",
+            &format!("video = \"{name}\" # "),
+        );
+        let message = fail(&["check", text(&survey)], 3);
+        assert!(
+            message.contains(name) && message.contains("list of other files"),
+            "{message}"
+        );
+    }
+    // A pattern of pictures is no file.
+    edit(
+        &survey.join("survey.toml"),
+        "video = \"",
+        "video = \"frames/%06d.png\" # ",
+    );
+    let message = fail(&["check", text(&survey)], 3);
+    assert!(message.contains("frames.video is relative"), "{message}");
+}
+
+/// Folders whose names look like addresses or options are folders.
+#[test]
+fn folders_may_look_like_addresses() {
+    if is_ffmpeg_missing() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let survey = simulated(dir.path());
+    into_video(&survey, "v.mkv", &LOSSLESS);
+    std::fs::create_dir(dir.path().join("http:")).unwrap();
+    for name in ["http:/127.0.0.1:18999", "a:b", "-dash"] {
+        std::fs::rename(&survey, dir.path().join(name)).unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+            .args(["check", "--", name])
+            .current_dir(dir.path())
+            .output()
+            .unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{name}: {message}");
+        std::fs::rename(dir.path().join(name), &survey).unwrap();
+    }
+}

@@ -6,12 +6,14 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
 use tunnelstitch::inspect::{Marks, Viewer};
 
 /// A server, ended with this.
 struct Running {
     child: Child,
     port: u16,
+    token: String,
 }
 
 impl Running {
@@ -30,12 +32,15 @@ impl Running {
             .map_while(Result::ok)
             .find_map(|line| line.strip_prefix("http://127.0.0.1:").map(str::to_owned))
             .expect("an address");
-        let port = address.split('/').next().unwrap().parse().expect("a port");
-        Self { child, port }
+        let (port, rest) = address.split_once('/').expect("a path");
+        let token = rest.split('/').next().unwrap().to_owned();
+        assert_eq!(token.len(), 32, "{rest}");
+        let port = port.parse().expect("a port");
+        Self { child, port, token }
     }
 
     fn address(&self) -> String {
-        format!("http://127.0.0.1:{}/", self.port)
+        format!("http://127.0.0.1:{}/{}/", self.port, self.token)
     }
 
     /// Sends a request letter by letter as it is given; status and body of the answer.
@@ -56,9 +61,10 @@ impl Running {
         (status, body)
     }
 
-    /// Sends a request with the correct host.
+    /// Sends a request with the correct host and token.
     fn ask(&self, line: &str, headers: &str, body: &str) -> (u16, String) {
         let length = body.len();
+        let line = line.replacen(" /", &format!(" /{}/", self.token), 1);
         self.send(&format!(
             "{line} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\
              Content-Length: {length}\r\n{headers}\r\n{body}",
@@ -238,6 +244,114 @@ fn the_server_answers_its_own_page_and_writes_nothing_but_marks() {
         message.contains("marks.geojson") && message.contains("move it away"),
         "{message}"
     );
+}
+
+/// A folder of the page that `export --web` has written.
+fn small_site(folder: &Path) -> std::path::PathBuf {
+    let site = folder.join("site");
+    let survey = blender_survey();
+    let export = [
+        "export",
+        text(&survey),
+        "--poses",
+        "truth",
+        "--layers",
+        "truth",
+    ];
+    let options = ["--px-per-metre", "10", "--web", text(&site), "--quiet"];
+    succeed(&[&export[..], &options].concat());
+    site
+}
+
+#[test]
+fn without_the_token_nothing_is_told() {
+    if npm::is_viewer_missing() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let server = Running::start(&[text(&small_site(dir.path()))]);
+    let host = format!("Host: 127.0.0.1:{}\r\n", server.port);
+    let wrong = "0".repeat(32);
+    for path in [
+        "/",
+        "/api/marks",
+        "/tunnel.json",
+        &format!("/{wrong}/api/marks"),
+    ] {
+        let (status, body) = server.send(&format!("GET {path} HTTP/1.1\r\n{host}\r\n"));
+        assert_eq!(status, 403, "{path}: {body}");
+    }
+    assert_eq!(server.ask("GET /api/marks", "", "").0, 200);
+}
+
+/// Idle and slow connections, before and after their request, keep nobody waiting.
+#[test]
+fn others_do_not_wait_for_idle_connections() {
+    if npm::is_viewer_missing() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let server = Running::start(&[text(&small_site(dir.path()))]);
+    let connect = || TcpStream::connect(("127.0.0.1", server.port)).expect("a connection");
+    let begun = Instant::now();
+    let idle: Vec<TcpStream> = (0..200).map(|_| connect()).collect();
+    assert_eq!(server.ask("GET /server.json", "", "").0, 200);
+    let answered: Vec<TcpStream> = (0..80)
+        .map(|_| {
+            let mut stream = connect();
+            let request = format!("GET /x HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", server.port);
+            // The server may have dropped it already.
+            let _ = stream.write_all(request.as_bytes());
+            stream
+        })
+        .collect();
+    assert_eq!(server.ask("GET /server.json", "", "").0, 200);
+    assert!(
+        begun.elapsed() < Duration::from_secs(8),
+        "{:?}",
+        begun.elapsed()
+    );
+    // A letter now and then does not prolong the time for a request.
+    let mut slow = connect();
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_secs(20) && slow.write_all(b"G").is_ok() {
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    assert!(
+        begun.elapsed() < Duration::from_secs(15),
+        "{:?}",
+        begun.elapsed()
+    );
+    drop((idle, answered));
+}
+
+/// Two servers of one survey lose no mark.
+#[test]
+fn marks_of_two_servers_are_all_kept() {
+    if npm::is_viewer_missing() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let site = small_site(dir.path());
+    let servers = [(); 2].map(|()| Running::start(&[text(&site)]));
+    let put = |server: usize, id: &str, mark: &str| {
+        servers[server].ask(&format!("PUT /api/marks/{id}"), JSON, mark)
+    };
+    for (server, id) in [(0, "a-1"), (1, "b-1"), (0, "a-2")] {
+        let (status, said) = put(server, id, &mark(id));
+        assert_eq!(status, 200, "{said}");
+    }
+    let kept = json(&site.join("marks.geojson"));
+    assert_eq!(kept["features"].as_array().unwrap().len(), 3);
+    // The same mark, changed by the other one: both versions are in the answer.
+    let note = |note: &str| mark("a-1").replace("\"note\":\"\"", &format!("\"note\":\"{note}\""));
+    assert_eq!(put(0, "a-1", &note("first")).0, 200);
+    let (status, said) = put(1, "a-1", &note("second"));
+    assert_eq!(status, 409, "{said}");
+    let versions: Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(versions["saved"]["properties"]["note"], "first");
+    assert_eq!(versions["sent"]["properties"]["note"], "second");
+    assert_eq!(put(1, "a-1", &note("second")).0, 200);
 }
 
 /// A wall once around with bright dots 1000 px of 6283 apart, along the axis and around: a metre,

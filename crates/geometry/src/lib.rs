@@ -3,6 +3,7 @@
 //! crates of `tunnelstitch` share.
 
 pub mod camera;
+pub mod files;
 pub mod numerics;
 pub mod surface;
 pub mod trajectory;

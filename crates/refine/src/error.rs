@@ -13,6 +13,16 @@ pub enum RefineError {
          needs two or more"
     )]
     SingleFrame,
+    /// Poses without motion.
+    #[error(
+        "all {frames} initial poses are equal, so that they say nothing about where the frames \
+         lie; give the motion of the camera: `tunnelstitch plan` writes poses from the advance and the \
+         angle of a step, `tunnelstitch gyro` from the log of a gyroscope"
+    )]
+    NoMotion {
+        /// Number of frames.
+        frames: usize,
+    },
     /// Frames and poses do not correspond.
     #[error("{frames} frames, but {poses} initial poses; give one pose for each frame, in order")]
     PoseCount {

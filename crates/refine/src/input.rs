@@ -104,3 +104,17 @@ impl<'a> From<&'a Survey> for RefineInput<'a> {
         }
     }
 }
+
+/// Largest motion of poses that are equal, metres and radians.
+const MAX_EQUAL_MOTION: f64 = 1e-6;
+
+/// True if all of two or more poses are equal, so that they say nothing about the frames: every
+/// frame would be compared with every other one.
+pub fn is_motionless(initial: &[StampedPose]) -> bool {
+    let is_equal = |pair: &[StampedPose]| {
+        let [a, b] = [&pair[0].pose, &pair[1].pose];
+        let motion_m = (a.t_wc - b.t_wc).norm();
+        motion_m.max(a.r_wc.angle_to(&b.r_wc)) <= MAX_EQUAL_MOTION
+    };
+    initial.len() > 1 && initial.windows(2).all(is_equal)
+}

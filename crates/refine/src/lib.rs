@@ -82,7 +82,7 @@ mod validation;
 mod verdict;
 
 pub use error::RefineError;
-pub use input::RefineInput;
+pub use input::{RefineInput, is_motionless};
 pub use model::problem_error::ProblemError;
 pub use options::{Photometry, RefineOptions, ShapeMode};
 pub use pipeline::{refine, refine_with_checkpoint};

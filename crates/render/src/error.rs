@@ -78,6 +78,8 @@ pub enum RenderError {
         needed_mib: u64,
         /// Memory that may be used or is free, MiB.
         available_mib: u64,
+        /// True if it is more than may be used, however much is free.
+        by_limit: bool,
     },
     /// The output.
     #[error(transparent)]

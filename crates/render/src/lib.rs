@@ -68,6 +68,7 @@ pub use output::budget::Budget;
 pub use output::cylinder;
 pub use output::gaps::{Coverage, Gap, gaps_csv};
 pub use output::maps::Map;
+pub use output::memory::available_bytes;
 pub use output::panorama::Panorama;
 pub use output::panorama_files::{
     CheckpointedFiles, DeformationAt, MaskedAt, PanoramaFileOptions, PanoramaFiles, WallProperties,

@@ -4,6 +4,7 @@ use crate::bad_frames::BadFramesError;
 use std::path::PathBuf;
 use tunnelstitch_core::persist::atomic::WriteError;
 use tunnelstitch_core::survey::SurveyError;
+use tunnelstitch_geometry::files::printed;
 
 /// Reason why a survey cannot be simulated.
 #[derive(Debug, thiserror::Error)]
@@ -19,7 +20,7 @@ pub enum SimulateError {
     #[error(transparent)]
     BadFrames(#[from] BadFramesError),
     /// The image of the wall's texture cannot be used.
-    #[error("{}: cannot use the texture: {what}", path.display())]
+    #[error("{}: cannot use the texture: {what}", printed(path))]
     Texture {
         /// The file.
         path: PathBuf,
@@ -52,7 +53,7 @@ pub enum SimulateError {
         reach_m: f64,
     },
     /// The output folder is in use.
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {what}", printed(path))]
     Exists {
         /// The folder.
         path: PathBuf,

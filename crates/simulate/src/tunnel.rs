@@ -11,6 +11,7 @@ use crate::options::SimulateOptions;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use tunnelstitch_core::survey::read_centreline;
+use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::surface::Centreline;
 use tunnelstitch_geometry::trajectory::Pose;
 
@@ -58,7 +59,7 @@ impl Tunnel {
             Some(path) => {
                 let points = read_centreline(path).map_err(|error| fail(error.to_string()))?;
                 let line = Centreline::through(&points, nominal_m, outline.farthest_m());
-                Some(line.map_err(|error| fail(format!("{}: {error}", path.display())))?)
+                Some(line.map_err(|error| fail(format!("{}: {error}", printed(path))))?)
             }
             None => None,
         };

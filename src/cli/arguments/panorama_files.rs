@@ -3,6 +3,7 @@
 use crate::cli::output::{
     Failure, create_parent_folder, picture_format, record, refuse_overwriting, survey_files,
 };
+use crate::files::printed;
 use crate::frames::{JPEG_LIMIT_PX, JPEG_QUALITY};
 use crate::persist::atomic;
 use crate::raster::Compression;
@@ -70,7 +71,7 @@ impl OutputArguments {
             if dzi.extension().is_none_or(|extension| extension != "dzi") {
                 return Err(Failure::usage(format!(
                     "--dzi {}: the name must end in .dzi",
-                    dzi.display()
+                    printed(dzi)
                 )));
             }
             create_parent_folder(dzi)?;
@@ -125,7 +126,7 @@ impl OutputArguments {
             return Err(Failure::usage(format!(
                 "{}: {width} × {height} px are more than a JPEG file holds; write .tif, or lower \
                  --px-per-metre",
-                self.out.display()
+                printed(&self.out)
             )));
         }
         Ok(())

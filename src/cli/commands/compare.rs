@@ -4,6 +4,7 @@ use crate::cli::arguments::{PictureArguments, PoseReadingArguments, positive};
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::evaluate::{ComparedPanoramas, Comparison, compare_survey, draw_before_after};
+use crate::files::printed;
 use crate::frames::{PictureFormat, write_picture};
 use crate::persist::atomic;
 use crate::progress::Progress;
@@ -102,7 +103,7 @@ pub fn run(
         json::print_text(&json)?;
     } else {
         terminal.say(comparison.to_string());
-        terminal.say(format!("wrote {}", arguments.out.display()));
+        terminal.say(format!("wrote {}", printed(&arguments.out)));
     }
     check_quality(&comparison, arguments.max_wall_px)
 }

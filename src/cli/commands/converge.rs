@@ -3,6 +3,7 @@
 use crate::cli::arguments::{JitterArgument, WallArgument, picture_size};
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::converge::{self, ConvergeOptions, SweepWall, TranslationScale};
+use crate::files::printed;
 use crate::trajectory::JitterModel;
 use std::path::PathBuf;
 
@@ -180,7 +181,7 @@ pub fn run(
     };
     terminal.say(format!(
         "wrote {} ({} runs done{kept})",
-        arguments.out.display(),
+        printed(&arguments.out),
         swept.done
     ));
     Ok(())
@@ -207,7 +208,7 @@ fn run_efficiency(
     }
     terminal.say(format!(
         "wrote {}",
-        arguments.out.join("efficiency.json").display()
+        printed(&arguments.out.join("efficiency.json"))
     ));
     Ok(())
 }

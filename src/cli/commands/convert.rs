@@ -6,6 +6,7 @@ use crate::cli::output::{
     Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, record, refuse_overwriting,
     survey_files,
 };
+use crate::files::printed;
 use crate::persist::atomic::{self, StagedFolder, WriteError};
 use crate::trajectory::{StampedPose, colmap, csv, kitti, nerfstudio, tum};
 use clap::ValueEnum;
@@ -73,8 +74,8 @@ pub fn run(
         terminal.warn(format!(
             "the frames are pictures of a video, named {} and so on; other programs need them as \
              files: ffmpeg -i {} -fps_mode passthrough -start_number 0 pictures/%06d.png",
-            frame.path.display(),
-            frame.file().display()
+            printed(&frame.path),
+            printed(frame.file())
         ));
     }
     let camera = || {
@@ -97,7 +98,7 @@ pub fn run(
             terminal.say(format!(
                 "wrote {} poses to {}",
                 trajectory.len(),
-                out.display()
+                printed(out)
             ));
             return Ok(());
         }
@@ -108,7 +109,7 @@ pub fn run(
     terminal.say(format!(
         "wrote {} poses to {}",
         trajectory.len(),
-        out.display()
+        printed(out)
     ));
     Ok(())
 }
@@ -144,15 +145,17 @@ fn write_colmap(
         if !entries.into_iter().all(is_of_model) {
             return Err(Failure::usage(format!(
                 "{}: holds other files than {}, so it is not replaced; choose another folder",
-                out.display(),
+                printed(out),
                 MODEL_FILES.join(", ")
             )));
         }
     }
+    let images = colmap::format_images(names, trajectory)
+        .map_err(|error| Failure::input(error.to_string()))?;
     let staged = StagedFolder::begin(out)?;
     let texts = [
         camera.cameras_txt(),
-        colmap::format_images(names, trajectory),
+        images,
         colmap::format_points().to_owned(),
     ];
     for (name, text) in MODEL_FILES.iter().zip(texts) {

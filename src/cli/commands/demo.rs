@@ -7,6 +7,7 @@ use super::refine_files::refine_into;
 use super::report::report_into;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::{Comparison, compare_survey};
+use crate::files::printed;
 use crate::persist::atomic;
 use crate::refine::RefineOptions;
 use crate::render::{Interpolation, Layout};
@@ -76,8 +77,8 @@ pub fn run(
         compared: folder("compare"),
         report: folder("report"),
     };
-    let (survey_path, refined_path) = (folders.survey.display(), folders.refined.display());
-    let compare_path = folders.compared.display();
+    let (survey_path, refined_path) = (printed(&folders.survey), printed(&folders.refined));
+    let compare_path = printed(&folders.compared);
     let options = SimulateOptions {
         frames: 12 * usize::from(arguments.turns),
         seed: arguments.seed,
@@ -104,14 +105,14 @@ pub fn run(
     let poses = folders.refined.join("poses.tum");
     say(format!(
         "\ntunnelstitch compare {survey_path} --refined {} --out {compare_path}",
-        poses.display()
+        printed(&poses)
     ));
     let (comparison, json) = compare_and_report(&survey, &folders, record, terminal)?;
     record.write(&arguments.out.join(RUN_FILE), &[])?;
     if arguments.json {
         return json::print_text(&json);
     }
-    let report_path = folders.report.display();
+    let report_path = printed(&folders.report);
     say(format!(
         "{comparison}\n\n\
          tunnelstitch report {survey_path} --refined {refined_path} --out {report_path}\n\n\

@@ -4,6 +4,7 @@ use crate::cli::arguments::{LayerArguments, LayerName, PosesArguments, TextureAr
 use crate::cli::output::{
     Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, json, record,
 };
+use crate::files::printed;
 use crate::inspect::{ExportFiles, MANIFEST, TILESET, Viewer, export_page, export_wall};
 use crate::render::Canvas;
 use crate::survey::Survey;
@@ -123,7 +124,7 @@ fn print_summary(report: &ExportReport, terminal: &Terminal) {
         for path in [report.glb, report.tiles].into_iter().flatten() {
             terminal.say(format!(
                 "{}: {} × {} px of wall, {:.2} px per metre, chainage {from_m:.3} to {to_m:.3} m",
-                path.display(),
+                printed(path),
                 canvas.columns,
                 canvas.rows,
                 canvas.px_per_metre
@@ -134,7 +135,7 @@ fn print_summary(report: &ExportReport, terminal: &Terminal) {
         let names: Vec<&str> = report.layers.iter().map(|name| name.text()).collect();
         terminal.say(format!(
             "{}: {}, for any web server, or `tunnelstitch view {0}`",
-            folder.display(),
+            printed(folder),
             names.join(", "),
         ));
     }
@@ -146,7 +147,7 @@ fn check_outputs(arguments: &ExportArguments) -> Result<(), Failure> {
         if glb.extension().is_none_or(|extension| extension != "glb") {
             return Err(Failure::usage(format!(
                 "--glb {}: the name must end in .glb",
-                glb.display()
+                printed(glb)
             )));
         }
         create_parent_folder(glb)?;
@@ -171,7 +172,7 @@ fn check_replaceable(folder: &Path, file: &str) -> Result<(), Failure> {
     }
     Err(Failure::usage(format!(
         "{}: holds other files than an earlier export; name another folder",
-        folder.display()
+        printed(folder)
     )))
 }
 

@@ -6,6 +6,7 @@ use crate::cli::arguments::{
 use crate::cli::output::{
     Failure, RunRecord, Suggestion, SuggestionArguments, Terminal, create_parent_folder, record,
 };
+use crate::files::printed;
 use crate::persist::atomic;
 use crate::survey::PriorSection;
 use crate::trajectory::gyro::{
@@ -197,7 +198,7 @@ impl SensorArguments {
                 return Err(Failure::input(format!(
                     "{}: has no orientation of the sensor in the camera; give --orientation \
                      (Gyroflow's IMU orientation) or --body-to-camera FILE",
-                    log.path.display()
+                    printed(&log.path)
                 )));
             }
         };
@@ -329,6 +330,6 @@ fn print_summary(
     terminal.say(format!(
         "wrote {} poses to {}",
         baseline.trajectory.len(),
-        arguments.out.display()
+        printed(&arguments.out)
     ));
 }

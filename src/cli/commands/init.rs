@@ -2,6 +2,7 @@
 
 use crate::cli::arguments::positive;
 use crate::cli::output::{Failure, Terminal};
+use crate::files::printed;
 use crate::persist::atomic;
 use crate::survey::{Discovery, SURVEY_FILE, Survey};
 use std::path::{Path, PathBuf};
@@ -43,19 +44,19 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
     if path.exists() && !arguments.force {
         return Err(Failure::input(format!(
             "{}: exists already; --force replaces it",
-            path.display()
+            printed(&path)
         )));
     }
     let mut found = Discovery::of(folder)
-        .map_err(|error| Failure::input(format!("{}: {error}", folder.display())))?;
+        .map_err(|error| Failure::input(format!("{}: {error}", printed(folder))))?;
     choose_frames(arguments, &mut found)?;
     for line in summary(&found) {
         terminal.say(line);
     }
     atomic::write_text(&path, &found.survey_toml(arguments.radius_m))?;
-    terminal.say(format!("wrote {}", path.display()));
+    terminal.say(format!("wrote {}", printed(&path)));
     match Survey::open(folder) {
-        Ok(_) => terminal.say(format!("next: tunnelstitch check {}", folder.display())),
+        Ok(_) => terminal.say(format!("next: tunnelstitch check {}", printed(folder))),
         Err(error) => terminal.warn(format!("not ready yet: {error}")),
     }
     Ok(())
@@ -76,7 +77,7 @@ fn choose_frames(arguments: &InitArguments, found: &mut Discovery) -> Result<(),
         }
         None if found.pictures.is_empty() => Err(Failure::input(format!(
             "{}: holds no pictures (JPEG, PNG, TIFF, WebP) and no video, up to three folders below",
-            folder.display()
+            printed(folder)
         ))),
         None if arguments.every.is_some() => Err(Failure::usage(
             "--every needs a video, but the folder holds pictures: name the video with --video",
@@ -105,7 +106,7 @@ fn summary(found: &Discovery) -> Vec<String> {
             1 => video.count.to_string(),
             every => format!("{} of every {every}", video.count),
         };
-        let path = video.path.display();
+        let path = printed(&video.path);
         lines.push(row(
             "frames",
             format!("{path} ({count} pictures, {width} × {height} px)"),
@@ -113,7 +114,7 @@ fn summary(found: &Discovery) -> Vec<String> {
     }
     let chosen = found.video.as_ref().map(|video| &video.path);
     for video in found.videos.iter().filter(|video| Some(*video) != chosen) {
-        lines.push(row("other video", video.display().to_string()));
+        lines.push(row("other video", printed(video).to_string()));
     }
     for (k, group) in found.pictures.iter().enumerate() {
         let size = group
@@ -128,12 +129,12 @@ fn summary(found: &Discovery) -> Vec<String> {
         lines.push(row(name, text));
     }
     if let Some(mask) = &found.mask {
-        lines.push(row("mask", mask.display().to_string()));
+        lines.push(row("mask", printed(mask).to_string()));
     }
     for (k, (path, camera)) in found.calibrations.iter().enumerate() {
         let name = if k == 0 { "calibration" } else { "another" };
         let (width, height) = (camera.width, camera.height);
-        let text = format!("{} ({width} × {height} px)", path.display());
+        let text = format!("{} ({width} × {height} px)", printed(path));
         lines.push(row(name, text));
     }
     let is_same = |other: Option<&(PathBuf, _)>, path: &Path| other.is_some_and(|(p, _)| p == path);
@@ -148,7 +149,7 @@ fn summary(found: &Discovery) -> Vec<String> {
         let (format, count) = (poses.format, poses.entries.len());
         lines.push(row(
             name,
-            format!("{} ({format:?}, {count} poses)", path.display()),
+            format!("{} ({format:?}, {count} poses)", printed(path)),
         ));
     }
     lines

@@ -2,6 +2,7 @@
 //! writes.
 
 use crate::cli::output::{Failure, Terminal};
+use crate::files::printed;
 use crate::persist::atomic;
 use crate::render::{hit_of_pixel, place_frames};
 use crate::survey::Survey;
@@ -30,7 +31,7 @@ pub fn locate_points(
 ) -> Result<(), Failure> {
     let surface = survey.surface.as_ref();
     let placements = place_frames(surface, &survey.camera, poses, &survey.shutter())?;
-    let bad = |what: String| Failure::input(format!("{}: {what}", points.display()));
+    let bad = |what: String| Failure::input(format!("{}: {what}", printed(points)));
     let reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_path(points);
@@ -73,7 +74,7 @@ pub fn locate_points(
     atomic::write_text(out, &String::from_utf8_lossy(&table))?;
     terminal.say(format!(
         "wrote {}: {found} of {count} pixels show the wall",
-        out.display()
+        printed(out)
     ));
     Ok(())
 }
@@ -123,8 +124,8 @@ pub fn find_frame(survey: &Survey, name: &str) -> Result<usize, String> {
         (Some(first), Some(second)) => Err(format!(
             "{} and {} both have this name; give the folder, too, or an index \
              from 0 to {}",
-            survey.frames[first].path.display(),
-            survey.frames[second].path.display(),
+            printed(&survey.frames[first].path),
+            printed(&survey.frames[second].path),
             count - 1
         )),
         _ => name.parse().ok().filter(|k| *k < count).ok_or_else(|| {

@@ -16,6 +16,7 @@ pub mod plan;
 pub mod project;
 pub mod refine;
 pub mod refine_files;
+pub mod refine_memory;
 pub mod report;
 pub mod shell;
 pub mod simulate;

@@ -6,6 +6,7 @@ use crate::cli::arguments::{
 use crate::cli::output::{
     Failure, RunRecord, Suggestion, SuggestionArguments, Terminal, create_parent_folder, record,
 };
+use crate::files::printed;
 use crate::persist::atomic;
 use crate::survey::PriorSection;
 use crate::trajectory::{Rate, StampedPose, Trajectory, tum};
@@ -120,7 +121,7 @@ pub fn run(
         terminal.say(format!(
             "wrote {} poses to {}: chainage {:.3} to {:.3} m, angle {:.2} to {:.2}°",
             trajectory.len(),
-            arguments.out.display(),
+            printed(&arguments.out),
             first.chainage_m,
             last.chainage_m,
             first.angle_rad.to_degrees(),

@@ -3,6 +3,7 @@
 use crate::camera::{Camera, read_calibration};
 use crate::cli::arguments::{InterpolationArgument, positive};
 use crate::cli::output::{Failure, RunRecord, Terminal, picture_format, record};
+use crate::files::printed;
 use crate::frames::{FrameFile, load_colour, open_picture, write_picture};
 use crate::render::{Picture, cylinder};
 use image::ImageDecoder;
@@ -73,7 +74,7 @@ pub fn run(
     record.write(&record::path_beside(&arguments.out), &inputs)?;
     terminal.say(format!(
         "{}: {} × {} px, first pixel at û = {}, v̂ = {}",
-        arguments.out.display(),
+        printed(&arguments.out),
         result.image.width(),
         result.image.height(),
         result.origin_px[0],
@@ -88,7 +89,7 @@ fn described_camera(arguments: &ProjectArguments) -> Result<Camera, Failure> {
     if width < 2 || height < 2 {
         return Err(Failure::input(format!(
             "{}: {width} × {height} px is too small for a photo",
-            arguments.image.display()
+            printed(&arguments.image)
         )));
     }
     let mut camera = Camera::from_vertical_fov(width, height, arguments.fov_deg.to_radians());
@@ -99,7 +100,7 @@ fn described_camera(arguments: &ProjectArguments) -> Result<Camera, Failure> {
 }
 
 fn dimensions(path: &Path) -> Result<(u32, u32), Failure> {
-    let fail = |what: String| Failure::input(format!("{}: {what}", path.display()));
+    let fail = |what: String| Failure::input(format!("{}: {what}", printed(path)));
     let decoder = open_picture(path).map_err(|error| fail(error.to_string()))?;
     Ok(decoder.dimensions())
 }

@@ -3,7 +3,9 @@
 use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::commands::refine_files::refine_into;
+use crate::cli::commands::refine_memory::check_memory;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
+use crate::files::printed;
 use crate::persist::atomic;
 use crate::progress::Progress;
 use crate::refine::{
@@ -194,6 +196,7 @@ pub fn run(
             terminal.say(text);
         }
     };
+    check_memory(&survey)?;
     atomic::create_folder(&arguments.out)?;
     let result = arguments.out.join("refine");
     let (refined, json) = arguments.resume.run(&result, &origin, say, |checkpoint| {
@@ -294,12 +297,12 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
              estimate",
         );
     }
-    let out = arguments.out.display();
+    let out = printed(&arguments.out);
     let poses = arguments.out.join("poses.tum");
     terminal.say(format!(
         "wrote {} and {}",
-        poses.display(),
-        arguments.out.join(REFINEMENT_FILE).display()
+        printed(&poses),
+        printed(&arguments.out.join(REFINEMENT_FILE))
     ));
     if report.photometry == Photometry::Normalised {
         terminal.say(
@@ -326,7 +329,7 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
             "the wall deviates from the given shape by {:.1} mm (root mean square): {} has its \
              sections, `tunnelstitch report` draws them",
             shape.rms_mm,
-            arguments.out.join(SECTIONS_FILE).display()
+            printed(&arguments.out.join(SECTIONS_FILE))
         ));
     }
     let none_above_mm = report.shape.as_ref().and_then(|s| s.none_above_mm());
@@ -348,7 +351,7 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
         terminal.say(format!(
             "{out} is a survey with the refined calibration: tunnelstitch stitch {out} --poses {} \
              --out panorama.png",
-            poses.display()
+            printed(&poses)
         ));
     }
 }

@@ -5,6 +5,7 @@ use crate::cli::output::{Failure, RunRecord, Terminal, json};
 use crate::evaluate::deformation::{
     ShapeEstimate, deviation_sigmas_m, measure_sections, sections_csv,
 };
+use crate::files::printed;
 use crate::frames::{PictureFormat, write_picture};
 use crate::persist::atomic;
 use crate::persist::checkpoint::Checkpoint;
@@ -133,7 +134,7 @@ fn refuse_survey_folder(survey: &Path, out: &Path) -> Result<(), Failure> {
     match (survey.canonicalize(), out.canonicalize()) {
         (Ok(survey), Ok(folder)) if survey == folder => Err(Failure::input(format!(
             "{}: --out must not be the survey's own folder, whose {SURVEY_FILE} would be replaced",
-            out.display()
+            printed(out)
         ))),
         _ => Ok(()),
     }

@@ -4,6 +4,7 @@ use crate::cli::arguments::{PoseReadingArguments, positive};
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::evaluate::compare_survey;
+use crate::files::printed;
 use crate::persist::atomic::{self, StagedFolder};
 use crate::progress::Progress;
 use crate::render::Interpolation;
@@ -85,7 +86,7 @@ pub fn run(
     }
     terminal.say(format!(
         "wrote {}",
-        arguments.out.join("report.html").display()
+        printed(&arguments.out.join("report.html"))
     ));
     Ok(())
 }

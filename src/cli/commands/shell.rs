@@ -1,6 +1,7 @@
 //! `tunnelstitch completions` and `tunnelstitch man`: shell completions and manual pages.
 
 use crate::cli::output::{Failure, Terminal, json};
+use crate::files::printed;
 use crate::persist::atomic::{self, WriteError};
 use clap_complete::Shell;
 use std::path::PathBuf;
@@ -68,6 +69,6 @@ pub fn write_manual(
             .map_err(|source| WriteError::new(&path, source))?;
         atomic::write_text(&path, &String::from_utf8_lossy(&text))?;
     }
-    terminal.say(format!("wrote {}", arguments.out.display()));
+    terminal.say(format!("wrote {}", printed(&arguments.out)));
     Ok(())
 }

@@ -6,6 +6,7 @@ use crate::cli::arguments::{
     WallArgument, numbers, picture_size, positive, view_angle,
 };
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
+use crate::files::printed;
 use crate::simulate::{self, Illumination, SimulateOptions, Wall};
 use crate::survey::PriorSection;
 use crate::trajectory::JitterModel;
@@ -300,7 +301,7 @@ pub fn run(
     }
     // Collecting the components drops a trailing slash.
     let out: PathBuf = arguments.out.components().collect();
-    let out = out.display();
+    let out = printed(&out);
     let next = match arguments.experiment {
         Experiment::Free => format!("refine {out} --out {out}-refined"),
         Experiment::Centred | Experiment::OffCentre => {

@@ -7,6 +7,7 @@ use crate::cli::arguments::{
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{Failure, RunRecord, Terminal, json, record};
 use crate::evaluate::deformation::DeviationMap;
+use crate::files::printed;
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::read_covariances;
@@ -137,6 +138,9 @@ pub fn run(
         .resume
         .run(&output.out, &origin, say, |checkpoint| {
             output.check_formats(&canvas, format, run.layout)?;
+            for also in [&files.dzi, &files.maps].into_iter().flatten() {
+                checkpoint.lock_also(also)?;
+            }
             run.draw(&mut stitch, budget, checkpoint)?;
             record.write(&output.run_file(), &inputs)
         })
@@ -273,7 +277,7 @@ fn print_summary(report: &StitchReport, terminal: &Terminal) {
     say(format!(
         "{}: {} × {} px, {:.2} px per metre, chainage {from_m:.3} to {to_m:.3} m, {:.1} % covered \
          by {} frames",
-        report.out.display(),
+        printed(report.out),
         report.width,
         report.height,
         report.px_per_metre,

@@ -2,6 +2,8 @@
 
 use crate::cli::arguments::{LayerArguments, PosesArguments, TextureArguments};
 use crate::cli::output::{Failure, Terminal};
+use crate::files::limits::MAX_REPORT_BYTES;
+use crate::files::{printed, read_text};
 use crate::inspect::{
     MANIFEST, Marks, Server, ServerContent, Viewer, draw_layers, pose_source_frames,
 };
@@ -93,7 +95,7 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
 /// A survey that no longer exists.
 fn refined_folder(folder: &Path) -> Result<Option<(PathBuf, PosesArguments)>, Failure> {
     let report = folder.join(REFINEMENT_FILE);
-    let Ok(text) = std::fs::read_to_string(&report) else {
+    let Ok(text) = read_text(&report, MAX_REPORT_BYTES) else {
         return Ok(None);
     };
     let value: Option<serde_json::Value> = serde_json::from_str(&text).ok();
@@ -107,8 +109,8 @@ fn refined_folder(folder: &Path) -> Result<Option<(PathBuf, PosesArguments)>, Fa
         Some(survey) => Ok(Some((survey, PosesArguments::from_file(&poses)))),
         None => Err(Failure::usage(format!(
             "{}: its survey does not exist; use `tunnelstitch view SURVEY --poses {}`",
-            report.display(),
-            poses.display()
+            printed(&report),
+            printed(&poses)
         ))),
     }
 }
@@ -121,6 +123,6 @@ fn serve(served: ServerContent, port: u16, terminal: &Terminal) -> Result<(), Fa
     server.run();
     Err(Failure::bug(format!(
         "{}: the server has ended",
-        folder.display()
+        printed(folder)
     )))
 }

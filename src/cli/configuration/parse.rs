@@ -4,6 +4,7 @@ use super::option::{EffectiveOption, OptionSource, long_options};
 use super::survey_options::{SurveyOptions, read_survey_options};
 use super::variables::variable_name;
 use crate::cli::output::Failure;
+use crate::files::printed;
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command};
@@ -75,7 +76,7 @@ fn parse_with_survey(
         let what = text.strip_prefix("error: ").unwrap_or(&text);
         Failure::input(format!(
             "{}: [options.{}]: {what}",
-            from_survey.path.display(),
+            printed(&from_survey.path),
             from_survey.command
         ))
     })

@@ -3,6 +3,7 @@
 use super::option::long_options;
 use super::variables::CONFIGURABLE;
 use crate::cli::output::Failure;
+use crate::files::printed;
 use crate::survey::{Survey, SurveyFile, toml_path};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command};
@@ -49,7 +50,7 @@ pub(super) fn read_survey_options(
         return Ok(None);
     };
     let path = toml_path(survey);
-    let fail = |what: String| Failure::input(format!("{}: {what}", path.display()));
+    let fail = |what: String| Failure::input(format!("{}: {what}", printed(&path)));
     check_sections(&file).map_err(fail)?;
     let (Some(table), Some(sub)) = (file.options.get(name), command.find_subcommand(name)) else {
         return Ok(None);

@@ -80,7 +80,11 @@ impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
         let is_temporary = matches!(
             error.source.kind(),
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::Interrupted
+            ErrorKind::StorageFull
+                | ErrorKind::QuotaExceeded
+                | ErrorKind::FileTooLarge
+                | ErrorKind::OutOfMemory
+                | ErrorKind::Interrupted
         );
         if is_temporary {
             Self::temporary(error.to_string())
@@ -147,6 +151,10 @@ impl From<RenderError> for Failure {
         match error {
             RenderError::Raster(error) => error.into(),
             RenderError::Checkpoint(error) => error.into(),
+            // More may be free later.
+            RenderError::Memory {
+                by_limit: false, ..
+            } => Self::temporary(error.to_string()),
             _ => Self::input(error.to_string()),
         }
     }
@@ -163,9 +171,9 @@ impl From<InspectError> for Failure {
             InspectError::TooLong { .. } | InspectError::NoViewer | InspectError::Listen { .. } => {
                 Self::usage(error.to_string())
             }
-            InspectError::Marks { .. } | InspectError::Folder { .. } => {
-                Self::input(error.to_string())
-            }
+            InspectError::Marks { .. }
+            | InspectError::MarkConflict { .. }
+            | InspectError::Folder { .. } => Self::input(error.to_string()),
         }
     }
 }

@@ -12,4 +12,4 @@ pub use failure::Failure;
 pub use paths::{create_parent_folder, picture_format, refuse_overwriting, survey_files};
 pub use record::{RUN_FILE, RunRecord};
 pub use suggestion::{Suggestion, SuggestionArguments};
-pub use terminal::Terminal;
+pub use terminal::{Terminal, print_error};

@@ -1,6 +1,7 @@
 //! Checks of output paths, made before any work is done.
 
 use super::failure::Failure;
+use crate::files::printed;
 use crate::frames::PictureFormat;
 use crate::persist::atomic;
 use crate::survey::Survey;
@@ -15,7 +16,7 @@ pub fn picture_format(path: &Path) -> Result<PictureFormat, Failure> {
     if path.is_dir() {
         return Err(Failure::usage(format!(
             "{}: is a folder; name a file",
-            path.display()
+            printed(path)
         )));
     }
     create_parent_folder(path)?;
@@ -53,8 +54,8 @@ pub fn refuse_overwriting(outputs: &[PathBuf], inputs: Vec<PathBuf>) -> Result<(
         if let Some((_, other)) = replaced {
             return Err(Failure::usage(format!(
                 "{}: would replace {}; choose another name",
-                output.display(),
-                other.display()
+                printed(output),
+                printed(other)
             )));
         }
         taken.push((place, output));

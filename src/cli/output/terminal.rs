@@ -1,10 +1,19 @@
 //! Progress bars, summaries and warnings on the terminal.
 
+use crate::files::escape_controls;
 use crate::progress::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
 use std::sync::Mutex;
 use std::time::Duration;
+
+/// Prints a line on standard error with its control characters escaped. A standard error that is
+/// closed or full is not an error, and never a panic.
+pub fn print_error(text: &str) {
+    // At once, so that lines of several threads do not mix.
+    let line = escape_controls(text) + "\n";
+    let _ = std::io::stderr().write_all(line.as_bytes());
+}
 
 /// Progress bars on standard error (hidden with `--quiet` or if it is no terminal) and summaries on
 /// standard output.
@@ -26,13 +35,13 @@ impl Terminal {
     pub fn say(&self, text: impl AsRef<str>) {
         if !self.quiet {
             // A closed pipe (`| head`) is not an error.
-            let _ = writeln!(std::io::stdout(), "{}", text.as_ref());
+            let _ = writeln!(std::io::stdout(), "{}", escape_controls(text.as_ref()));
         }
     }
 
     /// Prints a warning on standard error, even when quiet.
     pub fn warn(&self, text: impl AsRef<str>) {
-        let _ = writeln!(std::io::stderr(), "warning: {}", text.as_ref());
+        print_error(&format!("warning: {}", text.as_ref()));
     }
 
     fn with_bar(&self, act: impl FnOnce(&ProgressBar)) {
@@ -68,7 +77,7 @@ impl Progress for Terminal {
     }
 
     fn detail(&self, text: &str) {
-        self.with_bar(|bar| bar.set_message(text.to_owned()));
+        self.with_bar(|bar| bar.set_message(escape_controls(text)));
     }
 
     fn finish(&self) {

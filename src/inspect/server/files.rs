@@ -1,11 +1,15 @@
 //! Responses with files of the folder and with frames.
 
 use crate::camera::Camera;
+use crate::files::read_regular;
 use crate::frames::{FrameFile, load_colour};
 use crate::inspect::server::response::Response;
 use image::ImageFormat;
 use std::io::Cursor;
 use std::path::Path;
+
+/// Largest file that is sent as it is, bytes.
+const MAX_FILE_BYTES: u64 = 512 << 20;
 
 /// Media type by a file's extension; other files are not served.
 fn media_type(name: &str) -> Option<&'static str> {
@@ -40,7 +44,7 @@ pub(super) fn read_file(folder: &Path, path: &str) -> Response {
         .canonicalize()
         .ok()
         .filter(|full| full.starts_with(folder));
-    match full.and_then(|full| std::fs::read(full).ok()) {
+    match full.and_then(|full| read_regular(&full, MAX_FILE_BYTES).ok()) {
         Some(bytes) => Response::ok(kind, bytes),
         None => Response::not_found(),
     }
@@ -48,7 +52,7 @@ pub(super) fn read_file(folder: &Path, path: &str) -> Response {
 
 /// Reads a frame: the file itself if browsers can show it, else the decoded image as PNG.
 pub(super) fn read_frame(frame: &FrameFile, camera: &Camera) -> Response {
-    let bytes = std::fs::read(&frame.path).unwrap_or_default();
+    let bytes = read_regular(&frame.path, MAX_FILE_BYTES).unwrap_or_default();
     let kind = match image::guess_format(&bytes) {
         Ok(ImageFormat::Jpeg) => "image/jpeg",
         Ok(ImageFormat::Png) => "image/png",

@@ -3,10 +3,13 @@
 use crate::camera::Camera;
 use crate::frames::FrameSet;
 use crate::inspect::error::InspectError;
-use crate::inspect::marks::{Mark, Marks};
+use crate::inspect::mark::Mark;
+use crate::inspect::marks::Marks;
+use crate::inspect::server::connections::{Connections, Place, Timed};
 use crate::inspect::server::files;
 use crate::inspect::server::request::Request;
 use crate::inspect::server::response::Response;
+use crate::inspect::server::token::Token;
 use crate::inspect::viewer::Viewer;
 use crate::render::{Placement, sightings};
 use crate::surface::{Surface, WallPoint};
@@ -17,11 +20,14 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// Number of worker threads with one connection each; browsers open fewer to one server.
-const THREADS: usize = 12;
-
-/// Timeout of a connection without data.
-const TIMEOUT: Duration = Duration::from_secs(10);
+/// Time for a whole request.
+const REQUEST_TIME: Duration = Duration::from_secs(10);
+/// Time for a whole response, of some MiB at most.
+const RESPONSE_TIME: Duration = Duration::from_secs(60);
+/// Time in which the sender of a request is to read the response and close the connection.
+const DRAIN_TIME: Duration = Duration::from_secs(2);
+/// Pause after a connection that could not be accepted.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 
 /// Maximum bytes of a refused request that are drained, so that its sender reads the response.
 const MAX_DRAINED_BYTES: u64 = 8 << 20;
@@ -54,6 +60,8 @@ pub struct ServerContent {
 pub struct Server {
     listener: TcpListener,
     port: u16,
+    token: Token,
+    connections: Connections,
     folder: PathBuf,
     viewer: Viewer,
     source_frames: Option<SourceFrames>,
@@ -82,6 +90,8 @@ impl Server {
         Ok(Self {
             listener,
             port,
+            token: Token::random(),
+            connections: Connections::default(),
             folder,
             viewer: content.viewer,
             source_frames: content.source_frames,
@@ -89,52 +99,70 @@ impl Server {
         })
     }
 
-    /// The server's address for a browser.
+    /// The server's address for a browser, with the token without which requests are refused.
     pub fn address(&self) -> String {
-        format!("http://127.0.0.1:{}/", self.port)
+        format!("http://127.0.0.1:{}/{}/", self.port, self.token.text())
     }
 
     /// Serves requests until the program ends.
     pub fn run(&self) {
         std::thread::scope(|scope| {
-            for _ in 0..THREADS {
-                scope.spawn(|| {
-                    loop {
-                        // Aborted connections are not errors.
-                        if let Ok((stream, _)) = self.listener.accept() {
-                            let _ = self.serve(stream);
-                        }
-                    }
-                });
+            loop {
+                let Ok((stream, _)) = self.listener.accept() else {
+                    // Aborted connections are not errors; too many open files may be closed soon.
+                    std::thread::sleep(ACCEPT_PAUSE);
+                    continue;
+                };
+                if let Ok(place) = self.connections.admit(&stream) {
+                    let serve = move || self.serve(&stream, &place);
+                    // Without a thread, the connection is closed.
+                    let _ = std::thread::Builder::new().spawn_scoped(scope, serve);
+                }
             }
         });
     }
 
     /// Reads a request and writes its response.
-    fn serve(&self, mut stream: TcpStream) -> std::io::Result<()> {
-        stream.set_read_timeout(Some(TIMEOUT))?;
-        stream.set_write_timeout(Some(TIMEOUT))?;
+    fn serve(&self, stream: &TcpStream, place: &Place) -> std::io::Result<()> {
         stream.set_nodelay(true)?;
-        match Request::read(&stream) {
+        let read = Request::read(Timed::new(stream, REQUEST_TIME));
+        if !place.begin_answer() {
+            return Ok(());
+        }
+        let mut writer = Timed::new(stream, RESPONSE_TIME);
+        match read {
             Ok(None) => return Ok(()),
             Ok(Some(request)) => {
-                let response = match request.authorise(self.port) {
-                    Ok(()) => self.route(&request),
-                    Err(refused) => refused,
-                };
-                response.write(&mut stream, request.method != "HEAD")?;
+                let response = self.answer(&request);
+                response.write(&mut writer, request.method != "HEAD")?;
             }
-            Err(refused) => refused.write(&mut stream, true)?,
+            Err(refused) => refused.write(&mut writer, true)?,
         }
         stream.shutdown(Shutdown::Write)?;
+        place.end_answer();
         // Unread data would reset the connection before the response arrives.
-        std::io::copy(&mut stream.take(MAX_DRAINED_BYTES), &mut std::io::sink())?;
+        let rest = Timed::new(stream, DRAIN_TIME);
+        std::io::copy(&mut rest.take(MAX_DRAINED_BYTES), &mut std::io::sink())?;
         Ok(())
     }
 
-    /// Routes a request.
-    fn route(&self, request: &Request) -> Response {
-        let target = request.target.as_str();
+    /// Checks a request and routes it.
+    fn answer(&self, request: &Request) -> Response {
+        match (
+            request.authorise(self.port),
+            self.token.strip(&request.target),
+        ) {
+            (Err(refused), _) => refused,
+            (Ok(()), Some(target)) => self.route(target, request),
+            (Ok(()), None) => Response::refuse(
+                403,
+                "the address is not the one that tunnelstitch view has printed",
+            ),
+        }
+    }
+
+    /// Routes a request; `target` is behind the token.
+    fn route(&self, target: &str, request: &Request) -> Response {
         let (path, query) = target.split_once('?').unwrap_or((target, ""));
         let read = request.is_read();
         match path.strip_prefix("/api/") {
@@ -197,6 +225,7 @@ impl Server {
         };
         match changed {
             Ok(()) => Response::json(&json!({ "saved": true })),
+            Err(InspectError::MarkConflict { versions }) => Response::conflict(&versions),
             Err(error) => Response::refuse(500, &error.to_string()),
         }
     }

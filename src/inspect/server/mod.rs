@@ -7,11 +7,17 @@
 //! server's own is refused (DNS rebinding), and requests that change marks must come from the
 //! server's own page (cross-site request forgery; `Request::authorise`). Paths are plain names
 //! below the folder without any decoding, and the files that they lead to must lie in the folder.
-//! Nothing but the marks is written.
+//! Nothing but the marks is written. Other programs and users of this machine can connect, too:
+//! every path begins with a random token, which only the printed address has ([`token::Token`]).
+//!
+//! A connection has one request, a time for it, and a time for its answer, so that slow or idle
+//! ones do not keep others waiting ([`connections::Connections`]).
 
+mod connections;
 mod files;
 mod http_server;
 mod request;
 mod response;
+mod token;
 
 pub use http_server::{Server, ServerContent, SourceFrames};

@@ -3,7 +3,6 @@
 use crate::inspect::server::response::Response;
 use serde::de::DeserializeOwned;
 use std::io::{BufRead, BufReader, Read};
-use std::net::TcpStream;
 
 /// Maximum size of a request's head, bytes.
 const MAX_HEAD_BYTES: usize = 16 << 10;
@@ -27,7 +26,7 @@ impl Request {
     ///
     /// # Errors
     /// The response to an invalid or too long request.
-    pub(super) fn read(stream: &TcpStream) -> Result<Option<Self>, Response> {
+    pub(super) fn read(stream: impl Read) -> Result<Option<Self>, Response> {
         let mut reader = BufReader::new(stream);
         let mut head = Vec::new();
         // Line by line up to the empty line.

@@ -46,6 +46,14 @@ impl Response {
         }
     }
 
+    /// The response to a change of what somebody else has changed: both versions, as JSON.
+    pub(super) fn conflict(versions: &impl Serialize) -> Self {
+        Self {
+            status: 409,
+            ..Self::json(versions)
+        }
+    }
+
     /// The response for an unknown path.
     pub(super) fn not_found() -> Self {
         Self::refuse(404, "there is nothing of that name")
@@ -88,6 +96,7 @@ fn reason(status: u16) -> &'static str {
         403 => "Forbidden",
         404 => "Not Found",
         405 => "Method Not Allowed",
+        409 => "Conflict",
         411 => "Length Required",
         413 => "Content Too Large",
         415 => "Unsupported Media Type",

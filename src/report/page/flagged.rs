@@ -1,9 +1,11 @@
 //! Section about rejected frames, with the rejection reason.
 
 use super::page_data::PageData;
+use crate::files::printed;
 use crate::refine::{FrameFlag, FrameReport};
 use crate::report::quantity::{count, fixed, short};
 use maud::{Markup, html};
+use std::path::Path;
 
 /// Largest number of frames without a picture that are listed.
 const MAX_LISTED_FRAMES: usize = 200;
@@ -36,7 +38,7 @@ pub fn section(data: &PageData) -> Option<Markup> {
                                 alt=(format!("Frame {}", thumbnail.frame));
                             div {
                                 h3 { "Frame " (frame.index) " " (badge(frame.flag)) }
-                                p.file { (frame.file) }
+                                p.file { (file_name(frame)) }
                                 p { (reason_sentence(frame)) }
                                 p.facts { (facts(data, frame)) }
                             }
@@ -58,7 +60,7 @@ pub fn section(data: &PageData) -> Option<Markup> {
                             @for frame in others.iter().take(MAX_LISTED_FRAMES).filter_map(frame) {
                                 tr {
                                     td.number { (frame.index) }
-                                    td { (frame.file) }
+                                    td { (file_name(frame)) }
                                     td { (badge(frame.flag)) }
                                     td { (frame.reason.as_deref().unwrap_or("–")) }
                                 }
@@ -75,6 +77,11 @@ pub fn section(data: &PageData) -> Option<Markup> {
             }
         }
     })
+}
+
+/// The file of a frame, without control characters.
+fn file_name(frame: &FrameReport) -> String {
+    printed(Path::new(&frame.file)).to_string()
 }
 
 /// The flag of a frame.

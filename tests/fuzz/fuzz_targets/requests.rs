@@ -1,4 +1,5 @@
-//! Requests to the viewer's server, through a connection; `PORT` in them becomes the server's.
+//! Requests to the viewer's server, through a connection; `PORT` and `TOKEN` in them become the
+//! server's.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -10,10 +11,10 @@ use tunnelstitch::render::place;
 use tunnelstitch::survey::Survey;
 use tunnelstitch_fuzz::small_survey;
 
-/// The port of a server that runs until the process ends.
-fn port() -> &'static str {
-    static PORT: OnceLock<String> = OnceLock::new();
-    PORT.get_or_init(|| {
+/// Port and token of a server that runs until the process ends.
+fn address() -> &'static [String; 2] {
+    static ADDRESS: OnceLock<[String; 2]> = OnceLock::new();
+    ADDRESS.get_or_init(|| {
         let survey = Survey::open(small_survey()).unwrap();
         let surface = survey.surface.as_ref();
         let placed = place(
@@ -43,21 +44,28 @@ fn port() -> &'static str {
         let server = Server::listen(served, 0).unwrap();
         let address = server.address();
         std::thread::spawn(move || server.run());
-        let port = address.rsplit(':').next().unwrap();
-        port.trim_end_matches('/').to_owned()
+        let rest = address.rsplit(':').next().unwrap();
+        let (port, token) = rest.trim_end_matches('/').split_once('/').unwrap();
+        [port, token].map(str::to_owned)
     })
 }
 
-fuzz_target!(|data: &[u8]| {
-    let mut request = Vec::new();
-    let mut rest = data;
-    while let Some(at) = rest.windows(4).position(|word| word == b"PORT") {
-        request.extend_from_slice(&rest[..at]);
-        request.extend_from_slice(port().as_bytes());
-        rest = &rest[at + 4..];
+/// Replaces a word.
+fn replaced(text: &[u8], word: &[u8], by: &str) -> Vec<u8> {
+    let (mut to, mut rest) = (Vec::new(), text);
+    while let Some(at) = rest.windows(word.len()).position(|found| found == word) {
+        to.extend_from_slice(&rest[..at]);
+        to.extend_from_slice(by.as_bytes());
+        rest = &rest[at + word.len()..];
     }
-    request.extend_from_slice(rest);
-    let mut stream = TcpStream::connect(format!("127.0.0.1:{}", port())).unwrap();
+    to.extend_from_slice(rest);
+    to
+}
+
+fuzz_target!(|data: &[u8]| {
+    let [port, token] = address();
+    let request = replaced(&replaced(data, b"PORT", port), b"TOKEN", token);
+    let mut stream = TcpStream::connect(format!("127.0.0.1:{port}")).unwrap();
     // The server may answer and close the connection before everything is sent.
     let _ = stream.write_all(&request);
     let _ = stream.shutdown(Shutdown::Write);

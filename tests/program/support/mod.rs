@@ -6,8 +6,9 @@ pub mod missing;
 pub mod npm;
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 
 /// The survey rendered by Blender.
 pub fn blender_survey() -> PathBuf {
@@ -85,6 +86,29 @@ pub fn fail(arguments: &[&str], code: i32) -> String {
     assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
     assert!(!message.contains("panicked"), "{message}");
     message
+}
+
+/// Runs the program for at most `seconds`; returns its exit code, none if it was stopped, and what
+/// it printed.
+pub fn run_within(arguments: &[&str], seconds: u64) -> (Option<i32>, String) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let end = Instant::now() + Duration::from_secs(seconds);
+    while child.try_wait().expect("a child").is_none() {
+        if Instant::now() > end {
+            child.kill().expect("a child");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let output = child.wait_with_output().expect("a child");
+    let texts = [output.stdout, output.stderr];
+    let text = String::from_utf8_lossy(&texts.concat()).into_owned();
+    (output.status.code(), text)
 }
 
 /// Simulates a survey into `out`; `options` are added to the defaults.

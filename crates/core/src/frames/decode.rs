@@ -55,7 +55,8 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
         }
         FrameSource::File => {}
     }
-    let content = Content::of(&file.path).map_err(|error| fail(error.to_string()))?;
+    let content =
+        Content::of(&file.path, width, height).map_err(|error| fail(error.to_string()))?;
     let bytes = content.as_ref();
     if bytes.starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(bytes) {
         return Err(fail("the JPEG file is truncated".to_owned()));
@@ -159,7 +160,7 @@ mod tests {
             let picture: DynamicImage = picture;
             picture.save(&path).unwrap();
             let bytes = std::fs::read(&path).unwrap();
-            let input = || Content::of(&path).unwrap().input();
+            let input = || Content::of(&path, 32, 24).unwrap().input();
             assert_eq!(plain_tiff(input(), 32, 24).is_some(), plain);
             assert!(plain_tiff(input(), 24, 32).is_none());
             let frame = FrameFile::picture(0, path.clone());

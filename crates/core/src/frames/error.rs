@@ -1,6 +1,7 @@
 //! Errors of frames.
 
 use std::path::PathBuf;
+use tunnelstitch_geometry::files::printed;
 
 /// An error of a frame, a video or a mask.
 #[derive(Debug, thiserror::Error)]
@@ -25,7 +26,7 @@ pub enum FrameError {
     /// A frame is unreadable or damaged.
     #[error(
         "frame {index} ({}): {what}; restore the file, or remove the frame and its pose",
-        path.display()
+        printed(path)
     )]
     Decode {
         /// Index of the frame in the survey.
@@ -36,7 +37,7 @@ pub enum FrameError {
         what: String,
     },
     /// A video cannot be read.
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {what}", printed(path))]
     Video {
         /// The file.
         path: PathBuf,
@@ -44,7 +45,7 @@ pub enum FrameError {
         what: String,
     },
     /// A mask is unreadable or invalid.
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {what}", printed(path))]
     Mask {
         /// The file.
         path: PathBuf,
@@ -55,7 +56,7 @@ pub enum FrameError {
     #[error(
         "frame {index} ({}): {width} × {height} px, but the calibration is for {expected_width} × \
          {expected_height} px",
-        path.display()
+        printed(path)
     )]
     Size {
         /// Index of the frame in the survey.

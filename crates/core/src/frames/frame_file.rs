@@ -5,6 +5,7 @@ use super::video::Video;
 use image::DynamicImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use tunnelstitch_geometry::files::printed;
 
 /// The place that a frame's pixels come from.
 #[derive(Clone, Debug)]
@@ -86,6 +87,41 @@ impl FrameFile {
     }
 }
 
+/// Finds a file or folder whose name is not UTF-8, but matches its part of `pattern`, relative to
+/// `folder`: listing by patterns passes it over.
+fn find_unreadable_name(folder: &Path, pattern: &str) -> Option<PathBuf> {
+    let (part, rest) = pattern.split_once('/').unwrap_or((pattern, ""));
+    if !part.contains(['*', '?', '[']) {
+        return (!rest.is_empty())
+            .then(|| find_unreadable_name(&folder.join(part), rest))
+            .flatten();
+    }
+    let is_any_depth = part == "**";
+    let matcher = glob::Pattern::new(if is_any_depth { "*" } else { part }).ok()?;
+    for entry in std::fs::read_dir(folder).ok()?.flatten() {
+        let name = entry.file_name();
+        if !matcher.matches(&name.to_string_lossy()) {
+            continue;
+        }
+        let (path, is_folder) = (entry.path(), entry.path().is_dir());
+        let is_last = rest.is_empty();
+        if name.to_str().is_none() && (is_last != is_folder) {
+            return Some(path);
+        }
+        let inner = if is_any_depth { pattern } else { rest };
+        if is_folder
+            && !inner.is_empty()
+            && let Some(found) = find_unreadable_name(&path, inner)
+        {
+            return Some(found);
+        }
+    }
+    if is_any_depth && !rest.is_empty() {
+        return find_unreadable_name(folder, rest);
+    }
+    None
+}
+
 /// Lists the files that match `pattern` (glob syntax, relative to `folder`), sorted by name,
 /// without the mask.
 ///
@@ -100,7 +136,14 @@ pub fn list_frames(
         pattern: pattern.to_owned(),
         what,
     };
-    let escaped = glob::Pattern::escape(&folder.to_string_lossy());
+    let name = folder.to_str().ok_or_else(|| {
+        fail(format!(
+            "the folder {} has a name that is not UTF-8, by which frames cannot be listed; rename \
+             it",
+            printed(folder)
+        ))
+    })?;
+    let escaped = glob::Pattern::escape(name);
     let full = Path::new(&escaped).join(pattern);
     let found = glob::glob(&full.to_string_lossy()).map_err(|error| fail(error.to_string()))?;
     let mut paths = Vec::new();
@@ -109,6 +152,12 @@ pub fn list_frames(
         if !path.is_dir() && Some(path.as_path()) != mask {
             paths.push(path);
         }
+    }
+    if let Some(path) = find_unreadable_name(folder, pattern) {
+        return Err(fail(format!(
+            "the name of {} is not UTF-8; rename the file",
+            printed(&path)
+        )));
     }
     paths.sort();
     if paths.is_empty() {

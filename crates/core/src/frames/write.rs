@@ -4,9 +4,10 @@ use crate::persist::atomic::{self, WriteError};
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::tiff::TiffEncoder;
-use image::{DynamicImage, ImageError};
-use std::io;
+use image::{DynamicImage, ImageError, ImageResult};
+use std::io::{self, Seek, Write};
 use std::path::Path;
+use tunnelstitch_geometry::files::printed;
 
 /// An output name without the extension of a supported format.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -55,7 +56,7 @@ impl PictureFormat {
             }),
             _ => Err(FormatError(format!(
                 "{}: the name must end in .png, .jpg or .tif",
-                path.display()
+                printed(path)
             ))),
         }
     }
@@ -84,32 +85,37 @@ pub fn write_picture(
         return refuse("a TIFF file holds; write .png");
     }
     atomic::write(path, |writer| {
-        match format {
-            PictureFormat::Png => {
-                let encoder = PngEncoder::new_with_quality(
-                    writer,
-                    CompressionType::Fast,
-                    FilterType::Adaptive,
-                );
-                image.write_with_encoder(encoder)
-            }
-            PictureFormat::Jpeg { quality } => {
-                let encoder = JpegEncoder::new_with_quality(writer, quality);
-                if image.color().has_color() {
-                    image.to_rgb8().write_with_encoder(encoder)
-                } else {
-                    image.to_luma8().write_with_encoder(encoder)
-                }
-            }
-            PictureFormat::Tiff => {
-                DynamicImage::from(image.to_rgba8()).write_with_encoder(TiffEncoder::new(writer))
-            }
-        }
-        .map_err(|error| match error {
+        encode(image, format, writer).map_err(|error| match error {
             ImageError::IoError(source) => source,
             other => io::Error::other(other),
         })
     })
+}
+
+/// Encodes a picture.
+fn encode(
+    image: &DynamicImage,
+    format: PictureFormat,
+    writer: &mut (impl Write + Seek),
+) -> ImageResult<()> {
+    match format {
+        PictureFormat::Png => {
+            let encoder =
+                PngEncoder::new_with_quality(writer, CompressionType::Fast, FilterType::Adaptive);
+            image.write_with_encoder(encoder)
+        }
+        PictureFormat::Jpeg { quality } => {
+            let encoder = JpegEncoder::new_with_quality(writer, quality);
+            if image.color().has_color() {
+                image.to_rgb8().write_with_encoder(encoder)
+            } else {
+                image.to_luma8().write_with_encoder(encoder)
+            }
+        }
+        PictureFormat::Tiff => {
+            DynamicImage::from(image.to_rgba8()).write_with_encoder(TiffEncoder::new(writer))
+        }
+    }
 }
 
 #[cfg(test)]

@@ -43,6 +43,8 @@ use std::fs::{File, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use tunnelstitch_geometry::files::printed;
+use tunnelstitch_geometry::files::{open_without_links, read_regular};
 
 /// Name of the file that identifies the run.
 const ORIGIN_FILE: &str = "origin";
@@ -52,6 +54,8 @@ const STATE_EXTENSION: &str = "state";
 const LOCK_FILE: &str = "lock";
 /// Buffer size of the hasher, bytes.
 const HASH_BUFFER_BYTES: usize = 1 << 17;
+/// Largest file of a state, bytes.
+const MAX_STATE_BYTES: u64 = 16 << 30;
 /// Shortest time between two states.
 const MIN_SAVE_INTERVAL: Duration = Duration::from_millis(250);
 /// Shortest time between two states, as a multiple of the duration of the last save.
@@ -65,7 +69,7 @@ pub enum CheckpointError {
     #[error(
         "{}: it holds an interrupted run that cannot be resumed: {what}; give --fresh to restart, \
          or another --out",
-        folder.display()
+        printed(folder)
     )]
     Other {
         /// The folder.
@@ -76,7 +80,7 @@ pub enum CheckpointError {
     /// The checkpoint is corrupt.
     #[error(
         "{}: the interrupted run in it is corrupt ({what}); give --fresh to restart",
-        folder.display()
+        printed(folder)
     )]
     Damaged {
         /// The folder.
@@ -87,7 +91,7 @@ pub enum CheckpointError {
     /// Another process uses the checkpoint.
     #[error(
         "{}: another run is writing the same result; wait for it, or give another --out",
-        folder.display()
+        printed(folder)
     )]
     Busy {
         /// The folder.
@@ -132,7 +136,7 @@ impl Origin {
         // The files may be named relative to another folder.
         let mut pairs = self.inputs.iter().zip(&other.inputs);
         let pair = pairs.find(|(own, other)| own.blake3 != other.blake3);
-        pair.map(|(own, _)| format!("{} has changed since", own.path.display()))
+        pair.map(|(own, _)| format!("{} has changed since", printed(&own.path)))
     }
 }
 
@@ -150,6 +154,8 @@ pub struct Checkpoint {
     /// Time at which the current save became due.
     due: Option<Instant>,
     _lock: File,
+    /// Folders and locks of other outputs.
+    locks: Vec<(PathBuf, File)>,
 }
 
 impl Checkpoint {
@@ -168,6 +174,7 @@ impl Checkpoint {
             wait: MIN_SAVE_INTERVAL,
             due: None,
             _lock: lock(folder)?,
+            locks: Vec::new(),
         };
         checkpoint.begun = !fresh && checkpoint.kept_files()?.iter().any(|path| is_state(path));
         if checkpoint.begun {
@@ -228,6 +235,19 @@ impl Checkpoint {
         atomic::create_folder(&folder)?;
         self.others.push(folder.clone());
         Ok(folder)
+    }
+
+    /// Locks another output of the run, so that no run with another result writes it meanwhile: by
+    /// the lock of [`folder_of`] it, which is removed with the checkpoint.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Busy`] while another run has it; an error of the operating system.
+    pub fn lock_also(&mut self, output: &Path) -> Result<(), CheckpointError> {
+        let folder = folder_of(output);
+        atomic::create_folder(&folder)?;
+        let locked = lock(&folder)?;
+        self.locks.push((folder, locked));
+        Ok(())
     }
 
     /// True if the run resumes from saved states.
@@ -298,7 +318,7 @@ impl Checkpoint {
     /// The content of a file, if it is there, without the hash that ends it.
     fn read(&self, file: &str) -> Result<Option<Vec<u8>>, CheckpointError> {
         let path = self.folder.join(file);
-        let mut bytes = match std::fs::read(&path) {
+        let mut bytes = match read_regular(&path, MAX_STATE_BYTES) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(WriteError::new(&path, error).into()),
@@ -338,7 +358,8 @@ impl Checkpoint {
     /// An error of the operating system.
     pub fn finish(self) -> Result<(), WriteError> {
         self.clear()?;
-        let folders = self.others.iter().chain([&self.folder]);
+        let locked = self.locks.iter().map(|(folder, _)| folder);
+        let folders = self.others.iter().chain(locked).chain([&self.folder]);
         for folder in folders.filter(|folder| folder.is_dir()) {
             std::fs::remove_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
         }
@@ -381,9 +402,14 @@ pub fn folder_of(result: &Path) -> PathBuf {
 
 /// Locks the folder until the file is dropped or the process ends.
 fn lock(folder: &Path) -> Result<File, CheckpointError> {
+    // Its files are removed, so it must not lead elsewhere.
+    if folder.is_symlink() {
+        let what = io::Error::other("it is a symbolic link, which is not followed; remove it");
+        return Err(WriteError::new(folder, what).into());
+    }
     let path = folder.join(LOCK_FILE);
     let fail = |source| WriteError::new(&path, source);
-    let file = File::create(&path).map_err(fail)?;
+    let file = open_without_links(&path).map_err(fail)?;
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(CheckpointError::Busy {

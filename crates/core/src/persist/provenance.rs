@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::files::open_regular;
+use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// A file that cannot be hashed.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: cannot read: {source}", path.display())]
+#[error("{}: cannot read: {source}", printed(path))]
 pub struct HashError {
     /// The file.
     pub path: PathBuf,
@@ -32,7 +34,7 @@ fn hash_file(path: &Path) -> Result<blake3::Hash, HashError> {
         source,
     };
     let mut hasher = blake3::Hasher::new();
-    let file = std::fs::File::open(path).map_err(fail)?;
+    let file = open_regular(path).map_err(fail)?;
     hasher.update_reader(file).map_err(fail)?;
     Ok(hasher.finalize())
 }

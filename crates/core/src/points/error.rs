@@ -1,13 +1,14 @@
 //! Errors of files of points.
 
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::files::printed;
 
 /// A file of points that cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PointsError {
     /// The file as a whole.
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {what}", printed(path))]
     File {
         /// The file.
         path: PathBuf,
@@ -15,7 +16,7 @@ pub enum PointsError {
         what: String,
     },
     /// A line of a text.
-    #[error("{}:{line}: {what}", path.display())]
+    #[error("{}:{line}: {what}", printed(path))]
     Line {
         /// The file.
         path: PathBuf,
@@ -25,7 +26,7 @@ pub enum PointsError {
         what: String,
     },
     /// A point of a binary file.
-    #[error("{}: point {point}: {what}", path.display())]
+    #[error("{}: point {point}: {what}", printed(path))]
     Point {
         /// The file.
         path: PathBuf,

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
+use tunnelstitch_geometry::files::open_regular;
 
 /// Reads a file of points, in the order of the file: `visit` gets one after another, metres. The
 /// extension decides about the format: `ply`, `las`, `laz`, `pcd`, or `xyz`, `txt`, `csv`, `asc`
@@ -47,7 +48,7 @@ pub fn read_points(
 
 /// Opens a file for reading.
 fn open(path: &Path) -> Result<BufReader<File>, PointsError> {
-    let file = File::open(path);
+    let file = open_regular(path);
     let file = file.map_err(|error| PointsError::file(path, format!("cannot be read: {error}")))?;
     Ok(BufReader::with_capacity(1 << 18, file))
 }

@@ -12,6 +12,7 @@ use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+use tunnelstitch_geometry::files::write_without_links;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// The format of the pictures.
@@ -199,7 +200,7 @@ impl DziWriter {
             DziFormat::Png => encode_png(&self.spec, pixels, extent),
         };
         encoded
-            .and_then(|bytes| std::fs::write(&path, bytes))
+            .and_then(|bytes| write_without_links(&path, &bytes))
             .map_err(|source| WriteError::new(&path, source))?;
         Ok(path)
     }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
+use tunnelstitch_geometry::files::open_without_links;
 
 /// A file of compressed tiles in the order of their arrival.
 pub(super) struct Spool {
@@ -46,9 +47,7 @@ impl Spool {
     /// Opens the spool file `path`, which is kept, and truncates it to `end`.
     pub(super) fn reopen(path: &Path, end: u64) -> Result<Self, WriteError> {
         let fail = |source| WriteError::new(path, source);
-        let mut options = File::options();
-        let options = options.read(true).write(true).create(true).truncate(false);
-        let mut file = options.open(path).map_err(fail)?;
+        let mut file = open_without_links(path).map_err(fail)?;
         if file.metadata().map_err(fail)?.len() < end {
             let what = "tiles of the interrupted run are missing; give --fresh to restart";
             return Err(fail(io::Error::other(what)));

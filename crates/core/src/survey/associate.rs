@@ -5,6 +5,7 @@ use crate::frames::FrameFile;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::Path;
+use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::{PoseEntry, PoseFile, StampedPose, Trajectory, se3};
 
 /// The criterion by which poses are associated with frames.
@@ -97,7 +98,7 @@ pub(super) fn by_name(
             [] => Err(fail(format!(
                 "no pose of frame {} ({})",
                 frame.index,
-                frame.path.display()
+                printed(&frame.path)
             ))),
             [(_, only)] => Ok(*only),
             // Several folders contain files of that name: compare the path's components.
@@ -112,7 +113,7 @@ pub(super) fn by_name(
                          frames' paths",
                         several.len(),
                         frame.index,
-                        frame.path.display()
+                        printed(&frame.path)
                     ))),
                 }
             }
@@ -163,7 +164,7 @@ pub(super) fn by_time(
             fail(format!(
                 "frame {} ({}) at {time_s} s: {what}",
                 frame.index,
-                frame.path.display()
+                printed(&frame.path)
             ))
         };
         let after = all.partition_point(|stamped| stamped.time_s < time_s);

@@ -4,6 +4,7 @@ use crate::frames::FrameError;
 use crate::points::PointsError;
 use std::path::PathBuf;
 use tunnelstitch_geometry::camera::CalibrationError;
+use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::surface::SurfaceError;
 use tunnelstitch_geometry::trajectory::PoseError;
 
@@ -14,7 +15,7 @@ pub enum SurveyError {
     /// `survey.toml` cannot be read.
     #[error(
         "{}: cannot read the survey: {source}; a survey is a folder with a survey.toml",
-        path.display()
+        printed(path)
     )]
     Read {
         /// The file.
@@ -23,7 +24,7 @@ pub enum SurveyError {
         source: std::io::Error,
     },
     /// `survey.toml` is malformed or has an unknown key.
-    #[error("{}:{line}:{column}: {what}", path.display())]
+    #[error("{}:{line}:{column}: {what}", printed(path))]
     Parse {
         /// The file.
         path: PathBuf,
@@ -35,7 +36,7 @@ pub enum SurveyError {
         what: String,
     },
     /// A value is impossible.
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {what}", printed(path))]
     Value {
         /// The file.
         path: PathBuf,
@@ -49,7 +50,7 @@ pub enum SurveyError {
     #[error(
         "{}: {poses} poses for {frames} frames; every frame needs exactly one pose, in the order \
          of the frames' names{remedy}",
-        path.display()
+        printed(path)
     )]
     Count {
         /// The pose file.
@@ -62,7 +63,7 @@ pub enum SurveyError {
         remedy: &'static str,
     },
     /// Poses cannot be associated with frames, or their convention is unknown.
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {what}", printed(path))]
     Association {
         /// The pose file.
         path: PathBuf,
@@ -74,7 +75,7 @@ pub enum SurveyError {
         "frame {frame} ({}): its name contains no time (seconds with a decimal point, or \
          nanoseconds); give a file of times by \
          --frame-times FILE (frames.times in survey.toml)",
-        file.display()
+        printed(file)
     )]
     FrameTime {
         /// Index of the frame.
@@ -99,7 +100,7 @@ pub enum SurveyError {
         previous_s: f64,
     },
     /// A pose is impossible in the tunnel.
-    #[error("{}: frame {frame}: {source}; {remedy}", path.display())]
+    #[error("{}: frame {frame}: {source}; {remedy}", printed(path))]
     Placement {
         /// The pose file.
         path: PathBuf,

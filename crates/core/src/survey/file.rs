@@ -7,6 +7,8 @@ use super::tunnel::TunnelSection;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::files::limits::MAX_SURVEY_BYTES;
+use tunnelstitch_geometry::files::read_text;
 use tunnelstitch_geometry::trajectory::{Jitter, JitterModel};
 
 /// Name of the file that describes a survey.
@@ -154,7 +156,7 @@ impl From<PriorSection> for Jitter {
 /// # Errors
 /// An unreadable file; text that is no TOML, unknown or missing keys, with line and column.
 pub(super) fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
-    let text = std::fs::read_to_string(path).map_err(|source| SurveyError::Read {
+    let text = read_text(path, MAX_SURVEY_BYTES).map_err(|source| SurveyError::Read {
         path: path.to_owned(),
         source,
     })?;

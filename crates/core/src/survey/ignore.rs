@@ -16,6 +16,8 @@ pub struct IgnoreSection {
     pub chainage_m: Option<[f64; 2]>,
 }
 
+/// Largest number of regions.
+const MAX_REGIONS: usize = 10_000;
 /// Largest plausible angle, degrees.
 const MAX_ANGLE_DEG: f64 = 720.0;
 
@@ -57,6 +59,13 @@ pub(super) fn wall_regions(
     sections: &[IgnoreSection],
     surface: &dyn Surface,
 ) -> Result<WallRegions, String> {
+    if sections.len() > MAX_REGIONS {
+        return Err(format!(
+            "tunnel.ignore has {} items, and at most {MAX_REGIONS} are read; combine neighbouring \
+             ones",
+            sections.len()
+        ));
+    }
     let mut patches = WallRegions::default();
     for (k, section) in sections.iter().enumerate() {
         section

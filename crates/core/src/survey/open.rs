@@ -14,6 +14,7 @@ use crate::frames::{FrameSet, Mask};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
+use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::surface::{
     Bend, RadialField, Surface, WallRegions, bent, displaced, with_range,
 };
@@ -129,7 +130,7 @@ impl Survey {
                  {}°, so that its rows are not the rows that the sensor \
                  reads at once; extract the pictures with ffmpeg -noautorotate and calibrate for \
                  these, or remove readout_ms",
-                video.path().display(),
+                printed(video.path()),
                 video.rotation_deg()
             )));
         }
@@ -302,7 +303,7 @@ impl Survey {
                 "camera.readout_ms is {readout_ms}; it must be a number of milliseconds and no \
                  more than the {shortest_ms:.3} ms between \
                  the times of the nearest two poses in {}",
-                self.file.poses.initial.display()
+                printed(&self.file.poses.initial)
             ))
         }
     }
@@ -369,6 +370,10 @@ pub fn toml_path(path: &Path) -> PathBuf {
     }
 }
 
+/// Largest volume in which a frame is searched for, cubic degrees (1-σ): at 320 × 240 px, a frame
+/// takes two to three seconds of a processor at this width, and its time grows with the volume.
+const MAX_SEARCH_VOLUME_DEG3: f64 = 8000.0;
+
 /// Checks the numbers of a survey's file that stand for themselves; returns what is wrong.
 fn check_values(file: &SurveyFile) -> Result<(), String> {
     let prior = &file.prior;
@@ -390,6 +395,16 @@ fn check_values(file: &SurveyFile) -> Result<(), String> {
         ));
     }
     let radius_m = file.tunnel.nominal_m();
+    let volume_deg3 = Jitter::from(*prior).search_volume_deg3(radius_m);
+    if volume_deg3 > MAX_SEARCH_VOLUME_DEG3 {
+        return Err(format!(
+            "prior: rotation_sigma_deg = {} and translation_sigma_m = {:?} are too wide to search \
+             for every frame ({volume_deg3:.0} cubic degrees as seen in the picture, at most \
+             {MAX_SEARCH_VOLUME_DEG3:.0}, as for 20° about each axis); give better poses \
+             (tunnelstitch plan or gyro write some) and sigmas as small as their errors",
+            prior.rotation_sigma_deg, prior.translation_sigma_m
+        ));
+    }
     if let Some(max_range_m) = file.camera.max_range_m
         && !(radius_m..=1e3 * radius_m).contains(&max_range_m)
     {

@@ -6,6 +6,7 @@ use super::frame_times;
 use super::poses_section::PosesSection;
 use crate::frames::FrameFile;
 use std::path::Path;
+use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::{
     Convention, Pose, PoseFormat, StampedPose, Trajectory, read_camera_in_body, read_poses,
     read_tunnel_frame,
@@ -126,7 +127,7 @@ impl<'a> PoseReader<'a> {
                         "frame {} ({}) has time {} s, and the one before it {} s; frames are \
                          sorted by their names, which must be the order of their times",
                         frame.index,
-                        frame.path.display(),
+                        printed(&frame.path),
                         stamped.time_s,
                         before.time_s
                     ),

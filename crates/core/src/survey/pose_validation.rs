@@ -12,6 +12,7 @@ use super::pose_reader::InterpretedPoses;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
 use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{Convention, Pose, TunnelAxis, so3};
 
@@ -407,7 +408,7 @@ pub(super) fn validate_poses(
         return Ok(vec![format!(
             "{}: the cameras move or turn across the tunnel, not along its axis (the world's \
              y){likely}",
-            path.display()
+            printed(path)
         )]);
     }
     Ok(Vec::new())

@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::surface::section::{CircleOutline, Ellipse, PiecewiseOutline, Section};
-use tunnelstitch_geometry::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
+use tunnelstitch_geometry::surface::{
+    CentrePoint, Centreline, Circle, Prism, SIZES_M, Surface, Swept,
+};
 use tunnelstitch_geometry::trajectory::{PoseError, text};
 
 /// 1-σ of a real lining's deviation from its nominal shape, radii: a centimetre at a radius of
@@ -241,10 +243,8 @@ pub fn read_centreline(path: &Path) -> Result<Vec<CentrePoint>, SurveyError> {
                 return Err(PoseError::line(path, k + 1, what.to_owned()).into());
             }
         };
-        if !point.iter().all(|v| v.is_finite())
-            || radius_m.is_some_and(|r| !(r.is_finite() && r > 0.0))
-        {
-            let what = "its numbers must be finite, and a radius more than 0";
+        if !point.iter().all(|v| v.is_finite()) || radius_m.is_some_and(|r| !SIZES_M.contains(&r)) {
+            let what = "its numbers must be finite, and a radius from 0.001 to 100000 m";
             return Err(PoseError::line(path, k + 1, what.to_owned()).into());
         }
         points.push(CentrePoint { point, radius_m });

@@ -3,6 +3,8 @@
 use super::error::SurveyError;
 use serde::de::DeserializeOwned;
 use std::path::Path;
+use tunnelstitch_geometry::files::limits::MAX_WALL_BYTES;
+use tunnelstitch_geometry::files::read_text;
 use tunnelstitch_geometry::surface::WallPoint;
 
 /// Largest difference between the perimeter of a file and that of the tunnel, relative.
@@ -21,7 +23,7 @@ pub fn read_wall_file<T: DeserializeOwned>(
         path: path.to_owned(),
         what,
     };
-    let text = std::fs::read_to_string(path)
+    let text = read_text(path, MAX_WALL_BYTES)
         .map_err(|error| value(format!("cannot read {what}: {error}")))?;
     let file: T = serde_json::from_str(&text).map_err(|error| value(error.to_string()))?;
     check(&file).map_err(value)?;

@@ -4,6 +4,7 @@ use crate::error::EvaluateError;
 use std::path::PathBuf;
 use tunnelstitch_core::persist::atomic::WriteError;
 use tunnelstitch_core::survey::SurveyError;
+use tunnelstitch_geometry::files::printed;
 use tunnelstitch_refine::RefineError;
 use tunnelstitch_simulate::SimulateError;
 
@@ -20,7 +21,7 @@ pub enum ConvergeError {
         what: String,
     },
     /// The log of an earlier sweep cannot be continued.
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {what}", printed(path))]
     Log {
         /// Path of the log.
         path: PathBuf,

@@ -4,10 +4,13 @@ use crate::converge::error::ConvergeError;
 use crate::converge::run_record::{RunRecord, Settings};
 use crate::converge::sweep_cell::SweepCell;
 use std::collections::HashMap;
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::fs::{File, TryLockError};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tunnelstitch_core::persist::atomic::WriteError;
+use tunnelstitch_geometry::files::limits::MAX_TABLE_BYTES;
+use tunnelstitch_geometry::files::open_without_links;
+use tunnelstitch_geometry::files::regular::read_limited;
 
 /// Start of every line.
 const LINE_START: &[u8] = b"{\"schema_version\":";
@@ -33,13 +36,7 @@ impl RunLog {
     /// another program has the log open; [`ConvergeError::Write`].
     pub fn open(path: &Path, settings: &Settings, discard: bool) -> Result<Self, ConvergeError> {
         let fail = |source| ConvergeError::from(WriteError::new(path, source));
-        let mut file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(path)
-            .map_err(fail)?;
+        let mut file = open_without_links(path).map_err(fail)?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -55,8 +52,7 @@ impl RunLog {
         if discard {
             file.set_len(0).map_err(fail)?;
         }
-        let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).map_err(fail)?;
+        let bytes = read_limited(&file, MAX_TABLE_BYTES).map_err(fail)?;
         let end = bytes
             .iter()
             .rposition(|byte| *byte == b'\n')

@@ -42,7 +42,7 @@ pub enum SurfaceError {
     #[error("the camera's position or viewing direction is not finite")]
     NotFinite,
     /// A size of the section is impossible.
-    #[error("{name} is {size_m} m; it must be a positive number of metres")]
+    #[error("{name} is {size_m} m; it must be a positive number of metres, from 0.001 to 100000")]
     Size {
         /// Name of the size in `survey.toml`.
         name: &'static str,
@@ -68,9 +68,12 @@ pub enum SurfaceError {
     },
 }
 
-/// Rejects a size that is not positive and finite.
+/// Sizes of a section, metres; beyond them, numbers lose the digits that a pixel needs.
+pub const SIZES_M: std::ops::RangeInclusive<f64> = 1e-3..=1e5;
+
+/// Rejects a size that is not positive, or beyond [`SIZES_M`].
 pub(super) fn check_size(name: &'static str, size_m: f64) -> Result<(), SurfaceError> {
-    if size_m.is_finite() && size_m > 0.0 {
+    if SIZES_M.contains(&size_m) {
         Ok(())
     } else {
         Err(SurfaceError::Size { name, size_m })

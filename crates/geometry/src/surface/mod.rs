@@ -45,7 +45,7 @@ pub use centreline::{CentrePoint, Centreline, CentrelineFrame};
 pub use circle::Circle;
 pub use displaced::{Displaced, displaced};
 pub use displacement::{bend_jacobian, lens_jacobian, wall_jacobian};
-pub use error::SurfaceError;
+pub use error::{SIZES_M, SurfaceError};
 pub use foot_point::{FootPoint, foot_point, from_axis};
 pub use footprint::{Footprint, shortest_arc};
 pub use gauge::{Axis, Gauge, GaugeMotion};

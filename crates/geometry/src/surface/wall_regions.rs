@@ -8,7 +8,10 @@ use std::f64::consts::TAU;
 /// A set of wall regions, each between two angles and two chainages.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WallRegions {
+    /// Sorted by their smallest chainage.
     boxes: Vec<Footprint>,
+    /// Largest chainage of each box and of all before it, metres.
+    farthest_m: Vec<f64>,
     perimeter_m: f64,
 }
 
@@ -16,6 +19,7 @@ impl WallRegions {
     /// The empty set.
     pub const NONE: Self = Self {
         boxes: Vec::new(),
+        farthest_m: Vec::new(),
         perimeter_m: 0.0,
     };
 
@@ -37,18 +41,33 @@ impl WallRegions {
             _ => (surface.s_at_m(to) - from_m).rem_euclid(self.perimeter_m),
         };
         let [h_min_m, h_max_m] = chainage_m.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        self.boxes.push(Footprint {
-            s_min_m: from_m,
-            s_max_m: from_m + span_m,
-            h_min_m,
-            h_max_m,
-        });
+        let at = self.boxes.partition_point(|other| other.h_min_m <= h_min_m);
+        self.boxes.insert(
+            at,
+            Footprint {
+                s_min_m: from_m,
+                s_max_m: from_m + span_m,
+                h_min_m,
+                h_max_m,
+            },
+        );
+        self.farthest_m.truncate(at);
+        let before = self.farthest_m.last().copied();
+        let mut farthest_m = before.unwrap_or(f64::NEG_INFINITY);
+        for added in &self.boxes[at..] {
+            farthest_m = farthest_m.max(added.h_max_m);
+            self.farthest_m.push(farthest_m);
+        }
     }
 
     /// True if a region intersects `area`.
     pub fn intersects(&self, area: &Footprint) -> bool {
-        let mut boxes = self.boxes.iter();
-        boxes.any(|patch| patch.overlaps(area, self.perimeter_m))
+        // Those that begin beyond the area, and those before the last that may reach it, are not
+        // compared.
+        let end = (self.boxes).partition_point(|region| region.h_min_m <= area.h_max_m);
+        let start = self.farthest_m[..end].partition_point(|h_m| *h_m < area.h_min_m);
+        let mut near = self.boxes[start..end].iter();
+        near.any(|region| region.overlaps(area, self.perimeter_m))
     }
 
     /// True if a region contains a point.

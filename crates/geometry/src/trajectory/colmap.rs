@@ -95,9 +95,32 @@ fn check_points(line: &str) -> Result<(), String> {
     }
 }
 
+/// A name that the format cannot hold: a line of an image is separated by blanks.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the frame {name:?} has a blank or a control character in its name, which COLMAP's text model \
+     cannot hold; rename the file, or write csv"
+)]
+pub struct ImageNameError {
+    /// The name.
+    pub name: String,
+}
+
 /// Formats an `images.txt` for frames called `names`, all of camera 1; `trajectory` is
 /// camera-to-world.
-pub fn format_images(names: &[String], trajectory: &[StampedPose]) -> String {
+///
+/// # Errors
+/// [`ImageNameError`] for the first name with a blank or a control character, or without any
+/// character.
+pub fn format_images(
+    names: &[String],
+    trajectory: &[StampedPose],
+) -> Result<String, ImageNameError> {
+    let breaks = |c: char| c.is_whitespace() || c.is_control();
+    let is_unfit = |name: &&String| name.is_empty() || name.contains(breaks);
+    if let Some(name) = names.iter().find(is_unfit) {
+        return Err(ImageNameError { name: name.clone() });
+    }
     let mut text = format!(
         "# Image list with two lines of data per image:\n#   {}\n#   POINTS2D[] as (X, Y, \
          POINT3D_ID)\n\
@@ -122,7 +145,7 @@ pub fn format_images(names: &[String], trajectory: &[StampedPose]) -> String {
             t.z
         );
     }
-    text
+    Ok(text)
 }
 
 /// Formats a `points3D.txt` without points.

@@ -13,6 +13,7 @@ use super::stamped_pose::StampedPose;
 use super::{text, times};
 use csv::{ReaderBuilder, StringRecord, WriterBuilder};
 use nalgebra::Vector3;
+use std::borrow::Cow;
 use std::path::Path;
 
 pub(super) const FORM: &str = "frame,time_s,tx_m,ty_m,tz_m,qx,qy,qz,qw";
@@ -85,8 +86,7 @@ pub(super) fn is_header(line: &str) -> bool {
 }
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
-    let mut lines = text::lines(text);
-    let Some((header_number, header)) = lines.next() else {
+    let Some((header_number, header)) = text::lines(text).next() else {
         return Ok(Vec::new());
     };
     let separator = separator(header);
@@ -96,7 +96,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         Columns::of(&header).map_err(|what| PoseError::line(path, header_number, what))?;
     let mut entries: Vec<PoseEntry> = Vec::new();
     let mut names = text::Names::default();
-    for (number, line) in lines {
+    for (number, line) in records(text, separator).skip(1) {
         let last_s = entries.last().and_then(|entry| entry.time_s);
         let entry = split(line, separator)
             .and_then(|record| parse_record(&record, header.len(), &columns))
@@ -114,6 +114,54 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         entries.push(entry);
     }
     Ok(entries)
+}
+
+/// The records with content and the 1-based numbers of their first lines, as [`text::lines`]; a
+/// record goes on in the next line while a quoted field is open.
+fn records(text: &str, separator: u8) -> impl Iterator<Item = (usize, &str)> {
+    let mut rest = text;
+    let mut number = 0;
+    std::iter::from_fn(move || {
+        loop {
+            if rest.is_empty() {
+                return None;
+            }
+            number += 1;
+            let first = number;
+            let mut end = line_end(rest);
+            let is_comment = rest.trim_start().starts_with('#');
+            while !is_comment && end < rest.len() && is_open(&rest[..end], separator) {
+                end += line_end(&rest[end..]);
+                number += 1;
+            }
+            let (record, after) = rest.split_at(end);
+            rest = after;
+            let record = record.trim();
+            if !(record.is_empty() || is_comment) {
+                return Some((first, record));
+            }
+        }
+    })
+}
+
+/// Length of the first line of a text with its line break.
+fn line_end(text: &str) -> usize {
+    text.find('\n').map_or(text.len(), |k| k + 1)
+}
+
+/// True if a quoted field of a record is not closed.
+fn is_open(record: &str, separator: u8) -> bool {
+    let (mut is_quoted, mut at_start) = (false, true);
+    for byte in record.trim_start().bytes() {
+        if byte == b'"' && (is_quoted || at_start) {
+            // A doubled quote closes the field and opens it again.
+            is_quoted = !is_quoted;
+            at_start = !is_quoted;
+        } else {
+            at_start = byte == separator;
+        }
+    }
+    is_quoted
 }
 
 /// The separator of a table's columns, from its first line.
@@ -166,7 +214,7 @@ fn parse_record(
     };
     let name = match columns.name.map(word) {
         Some("") => return Err("the frame has no name".to_owned()),
-        name => name.map(str::to_owned),
+        name => name.map(|name| from_cell(name).to_owned()),
     };
     Ok(PoseEntry {
         name,
@@ -178,17 +226,82 @@ fn parse_record(
     })
 }
 
+/// A text as a cell of a table: one that a spreadsheet would run as a formula gets an apostrophe in
+/// front, and so does one that has it already; [`from_cell`] takes it away.
+pub fn to_cell(text: &str) -> Cow<'_, str> {
+    if is_formula(text.trim_start_matches('\'')) {
+        Cow::Owned(format!("'{text}"))
+    } else {
+        Cow::Borrowed(text)
+    }
+}
+
+/// The text of a cell that [`to_cell`] has made.
+pub fn from_cell(cell: &str) -> &str {
+    match cell.strip_prefix('\'') {
+        Some(text) if is_formula(text.trim_start_matches('\'')) => text,
+        _ => cell,
+    }
+}
+
+/// True for a text that spreadsheets take for a formula.
+fn is_formula(text: &str) -> bool {
+    text.starts_with(['=', '+', '-', '@', '\t', '\r'])
+}
+
 /// Formats a CSV of poses; `names` are those of the frames.
 pub fn format(names: &[String], trajectory: &[StampedPose]) -> String {
-    let mut writer = WriterBuilder::new().from_writer(Vec::new());
+    let mut writer = WriterBuilder::new()
+        // A name that begins like a comment is quoted.
+        .comment(Some(b'#'))
+        .from_writer(Vec::new());
     // Writing to memory cannot fail.
     let _ = writer.write_record(FORM.split(','));
     for (name, StampedPose { time_s, pose }) in names.iter().zip(trajectory) {
         let (t, q) = (&pose.t_wc, &pose.r_wc);
         let numbers = [*time_s, t.x, t.y, t.z, q.i, q.j, q.k, q.w];
-        let words = std::iter::once(name.clone()).chain(numbers.iter().map(f64::to_string));
+        let words =
+            std::iter::once(to_cell(name).into_owned()).chain(numbers.iter().map(f64::to_string));
         let _ = writer.write_record(words);
     }
     let bytes = writer.into_inner().unwrap_or_default();
     String::from_utf8_lossy(&bytes).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_name_of_a_frame_comes_back() {
+        let names = [
+            "a\n\"q\",.png",
+            "=HYPERLINK(1).png",
+            "'=x",
+            "'plain",
+            "-1",
+            "# x",
+            "\u{1b}[m",
+        ];
+        let names = names.map(str::to_owned);
+        let pose = Pose::identity();
+        let trajectory: Vec<StampedPose> = (0..names.len())
+            .map(|k| StampedPose {
+                time_s: k as f64,
+                pose,
+            })
+            .collect();
+        let text = format(&names, &trajectory);
+        assert!(!text.contains("\n=") && !text.contains("\n-"), "{text}");
+        let read = parse(Path::new("p.csv"), &text).unwrap();
+        let read: Vec<String> = read.into_iter().filter_map(|entry| entry.name).collect();
+        assert_eq!(read, names);
+    }
+
+    #[test]
+    fn a_quote_that_is_never_closed_is_an_error_of_its_line() {
+        let text = format!("# poses\n{FORM}\n\"a,0,0,0,0,0,0,0,1\nb,1,0,0,0,0,0,0,1\n");
+        let error = parse(Path::new("p.csv"), &text).unwrap_err().to_string();
+        assert!(error.starts_with("p.csv:3: "), "{error}");
+    }
 }

@@ -1,5 +1,6 @@
 //! Errors of pose files.
 
+use crate::files::printed;
 use std::path::{Path, PathBuf};
 
 /// An error of a file of poses, of frame times or of a rigid motion.
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum PoseError {
     /// The file cannot be read.
-    #[error("{}: cannot read the file: {source}", path.display())]
+    #[error("{}: cannot read the file: {source}", printed(path))]
     Read {
         /// The file.
         path: PathBuf,
@@ -15,7 +16,7 @@ pub enum PoseError {
         source: std::io::Error,
     },
     /// A line is invalid.
-    #[error("{}:{line}: {what}", path.display())]
+    #[error("{}:{line}: {what}", printed(path))]
     Line {
         /// The file.
         path: PathBuf,
@@ -25,7 +26,7 @@ pub enum PoseError {
         what: String,
     },
     /// The file as a whole is invalid.
-    #[error("{}: {what}", path.display())]
+    #[error("{}: {what}", printed(path))]
     File {
         /// The file.
         path: PathBuf,

@@ -20,7 +20,7 @@ fn read_text(text: &str) -> Result<PoseFile, PoseError> {
 
 fn names(count: usize) -> Vec<String> {
     (0..count)
-        .map(|k| format!("frames/a, \"{k}\".png"))
+        .map(|k| format!("frames/a,\"{k}\".png"))
         .collect()
 }
 
@@ -34,7 +34,7 @@ fn written(trajectory: &[StampedPose]) -> Vec<(PoseFormat, String)> {
         (PoseFormat::Csv, csv::format(&names, trajectory)),
         (
             PoseFormat::Colmap,
-            colmap::format_images(&names, trajectory),
+            colmap::format_images(&names, trajectory).unwrap(),
         ),
         (
             PoseFormat::Nerfstudio,

@@ -46,6 +46,20 @@ fn steered(executed: &UnitQuaternion<f64>, planned: &UnitQuaternion<f64>) -> Uni
 }
 
 impl Jitter {
+    /// Volume in which a frame is searched for, cubic degrees: the product of the 1-σ of pitch, yaw
+    /// and roll as they appear in the picture of a wall at `distance_m`,
+    /// `√(σ_R² + (σ_y/d)²) · √(σ_R² + (max(σ_x, σ_z)/d)²) · σ_R`, each at most half a turn. A
+    /// translation across the view looks like a rotation.
+    pub fn search_volume_deg3(&self, distance_m: f64) -> f64 {
+        let [x, y, z] = self.translation_sigma_m;
+        let rotation = self.rotation_sigma_rad;
+        let across = |shift_m: f64| rotation.hypot(shift_m / distance_m);
+        [across(y), across(x.max(z)), rotation]
+            .map(|sigma_rad| sigma_rad.to_degrees().min(180.0))
+            .iter()
+            .product()
+    }
+
     /// Simulates the execution of `plan` with this noise.
     ///
     /// The first pose of a random walk equals the plan's. Each pose draws three random numbers for

@@ -2,6 +2,8 @@
 
 use super::error::PoseError;
 use super::pose_entry::PoseEntry;
+use crate::files::limits::MAX_TABLE_BYTES;
+use crate::files::read_regular;
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::collections::HashSet;
 use std::path::Path;
@@ -11,7 +13,7 @@ use std::path::Path;
 /// # Errors
 /// An unreadable file, or one that is not UTF-8 text.
 pub fn read(path: &Path) -> Result<String, PoseError> {
-    let bytes = std::fs::read(path).map_err(|source| PoseError::Read {
+    let bytes = read_regular(path, MAX_TABLE_BYTES).map_err(|source| PoseError::Read {
         path: path.to_owned(),
         source,
     })?;

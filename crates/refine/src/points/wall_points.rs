@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use tunnelstitch_core::points::{PointsError, read_points};
 use tunnelstitch_core::survey::{Survey, SurveyError};
+use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{Surface, from_axis};
 use tunnelstitch_geometry::trajectory::Pose;
@@ -86,7 +87,7 @@ impl WallPoints {
             [from - reach_m, to + reach_m],
         )?;
         Ok(Some(Self {
-            file: file.display().to_string(),
+            file: printed(file).to_string(),
             ..points
         }))
     }
@@ -106,7 +107,7 @@ impl WallPoints {
         range_h_m: [f64; 2],
     ) -> Result<Self, PointsError> {
         let world_in_tunnel = tunnel_in_world.map(Pose::inverse);
-        let mut thinning = Thinning::new(path.display().to_string(), surface, range_h_m);
+        let mut thinning = Thinning::new(printed(path).to_string(), surface, range_h_m);
         let mut batch = Vec::with_capacity(BATCH);
         read_points(path, &mut |point| {
             batch.push(match &world_in_tunnel {

@@ -2,7 +2,7 @@
 //! both.
 
 use crate::error::RefineError;
-use crate::input::RefineInput;
+use crate::input::{RefineInput, is_motionless};
 use crate::model::context::{EstimationContext, total_displacement};
 use crate::model::frame_states::FrameStates;
 use crate::model::prior::{Prior, median_step_s};
@@ -53,8 +53,8 @@ impl<'a> Setup<'a> {
     /// Prepares a refinement.
     ///
     /// # Errors
-    /// [`RefineError::SingleFrame`], [`RefineError::PoseCount`], [`RefineError::OnlyRound`],
-    /// [`RefineError::GivenByPoints`], [`RefineError::Points`].
+    /// [`RefineError::SingleFrame`], [`RefineError::PoseCount`], [`RefineError::NoMotion`],
+    /// [`RefineError::OnlyRound`], [`RefineError::GivenByPoints`], [`RefineError::Points`].
     pub fn new(input: RefineInput<'a>, options: &'a RefineOptions) -> Result<Self, RefineError> {
         if input.frames.len() < 2 {
             return Err(RefineError::SingleFrame);
@@ -62,6 +62,9 @@ impl<'a> Setup<'a> {
         let (frames, poses) = (input.frames.len(), input.initial.len());
         if frames != poses {
             return Err(RefineError::PoseCount { frames, poses });
+        }
+        if is_motionless(input.initial) {
+            return Err(RefineError::NoMotion { frames });
         }
         let coarsest = options.coarsest_level(input.camera.shorter_side());
         let frames = FrameCache::new(

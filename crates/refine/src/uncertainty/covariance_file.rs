@@ -2,13 +2,16 @@
 
 use nalgebra::Matrix6;
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::files::limits::MAX_TABLE_BYTES;
+use tunnelstitch_geometry::files::printed;
+use tunnelstitch_geometry::files::read_text;
 
 /// Reason why a covariance file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CovarianceError {
     /// The file cannot be read.
-    #[error("{}: cannot read the covariances: {source}", path.display())]
+    #[error("{}: cannot read the covariances: {source}", printed(path))]
     Read {
         /// The file.
         path: PathBuf,
@@ -16,7 +19,10 @@ pub enum CovarianceError {
         source: std::io::Error,
     },
     /// A line is malformed.
-    #[error("{}:{line}: {what}; a covariance file is one that refine has written", path.display())]
+    #[error(
+        "{}:{line}: {what}; a covariance file is one that refine has written",
+        printed(path)
+    )]
     Line {
         /// The file.
         path: PathBuf,
@@ -36,7 +42,7 @@ const COLUMNS: usize = 39;
 /// # Errors
 /// [`CovarianceError`]; also if the frames are not 0 to `frames − 1` in ascending order.
 pub fn read_covariances(path: &Path, frames: usize) -> Result<Vec<Matrix6<f64>>, CovarianceError> {
-    let text = std::fs::read_to_string(path).map_err(|source| CovarianceError::Read {
+    let text = read_text(path, MAX_TABLE_BYTES).map_err(|source| CovarianceError::Read {
         path: path.to_owned(),
         source,
     })?;

@@ -65,7 +65,7 @@ impl Budget {
         output: u64,
         limit: u64,
     ) -> Result<Self, RenderError> {
-        let limit = memory::available_bytes().map_or(limit, |available| limit.min(available));
+        let available = memory::available_bytes();
         let format = frames.format();
         let (mut thumbnails, mut grid) = (0, 0);
         if options.needs_thumbnails() {
@@ -89,7 +89,8 @@ impl Budget {
         };
         let fixed = thumbnails + grid + band + output + decoding + readings;
         let needed = fixed + frames_least;
-        memory::check_available(canvas, frames, needed, Some(limit))?;
+        memory::check_limit(canvas, frames, needed, limit, available)?;
+        let limit = available.map_or(limit, |available| limit.min(available));
         // With the frames of one band none is decoded twice while bands are drawn; with more, some
         // are not even once more than for their thumbnails.
         let room = if frames.is_compressed() {

@@ -4,10 +4,15 @@ use crate::error::RenderError;
 use crate::layout::canvas::Canvas;
 use crate::sampling::picture_cache::PictureCache;
 
-/// Memory that is available without swapping, bytes, where the system reports it (Linux).
+/// Memory that is available without swapping and within the limit of the process's addresses
+/// (`ulimit -v`), bytes, where the system reports it (Linux).
 pub fn available_bytes() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    parse_meminfo(&text)
+    let read = |path: &str| std::fs::read_to_string(path).ok();
+    let free = read("/proc/meminfo").and_then(|text| parse_kib(&text, "MemAvailable:"));
+    let limit = read("/proc/self/limits").and_then(|text| parse_address_limit(&text));
+    let used = read("/proc/self/status").and_then(|text| parse_kib(&text, "VmSize:"));
+    let left = limit.map(|limit| limit.saturating_sub(used.unwrap_or(0)));
+    [free, left].into_iter().flatten().min()
 }
 
 /// Checks that drawing `canvas` from `frames` with `needed` bytes stays within `available`, if that
@@ -21,24 +26,47 @@ pub fn check_available(
     needed: u64,
     available: Option<u64>,
 ) -> Result<(), RenderError> {
-    match available {
-        Some(available) if needed > available => Err(RenderError::Memory {
+    check_limit(canvas, frames, needed, u64::MAX, available)
+}
+
+/// Checks that drawing with `needed` bytes stays within `limit` and within `available`, if that is
+/// known.
+///
+/// # Errors
+/// [`RenderError::Memory`].
+pub fn check_limit(
+    canvas: &Canvas,
+    frames: &PictureCache,
+    needed: u64,
+    limit: u64,
+    available: Option<u64>,
+) -> Result<(), RenderError> {
+    match available.map_or(limit, |available| limit.min(available)) {
+        least if needed > least => Err(RenderError::Memory {
+            by_limit: needed > limit,
             columns: canvas.columns,
             rows: canvas.rows,
             frames: frames.len(),
             needed_mib: needed.div_ceil(1 << 20),
-            available_mib: available >> 20,
+            available_mib: least >> 20,
         }),
         _ => Ok(()),
     }
 }
 
-fn parse_meminfo(meminfo: &str) -> Option<u64> {
-    let line = meminfo
-        .lines()
-        .find_map(|line| line.strip_prefix("MemAvailable:"))?;
+/// The number of KiB of the line that starts with `name`, in bytes.
+fn parse_kib(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kib * 1024)
+}
+
+/// The soft limit of the address space, bytes; None without a limit.
+fn parse_address_limit(limits: &str) -> Option<u64> {
+    let line = limits
+        .lines()
+        .find_map(|line| line.strip_prefix("Max address space"))?;
+    line.split_whitespace().next()?.parse().ok()
 }
 
 #[cfg(test)]
@@ -49,8 +77,12 @@ mod tests {
     #[test]
     fn the_available_line_is_read() {
         let text = "MemTotal:       16 kB\nMemAvailable:   12 kB\n";
-        assert_eq!(parse_meminfo(text), Some(12 * 1024));
-        assert_eq!(parse_meminfo("nothing"), None);
+        assert_eq!(parse_kib(text, "MemAvailable:"), Some(12 * 1024));
+        assert_eq!(parse_kib("nothing", "MemAvailable:"), None);
+        let line = "Max address space         102400000            unlimited            bytes";
+        assert_eq!(parse_address_limit(line), Some(102_400_000));
+        let none = line.replace("102400000", "unlimited");
+        assert_eq!(parse_address_limit(&none), None);
     }
 
     #[test]

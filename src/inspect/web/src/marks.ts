@@ -136,23 +136,25 @@ export function geojson(marks: Mark[]): string {
 /** Encodes marks as CSV in order of chainage, quoted by RFC 4180, as the server does. */
 export function csv(marks: Mark[]): string {
   const number = (value: number | undefined, digits: number) => value?.toFixed(digits) ?? "";
+  // A spreadsheet would run a text that begins like a formula.
+  const inert = (text: string) => (/^'*[=+\-@\t\r]/.test(text) ? `'${text}` : text);
   const columns: [string, (id: string, p: Mark["properties"]) => string][] = [
-    ["id", (id) => id],
-    ["class", (_, p) => p.class],
+    ["id", (id) => inert(id)],
+    ["class", (_, p) => inert(p.class)],
     ["severity", (_, p) => String(p.severity)],
     ["chainage_m", (_, p) => number(p.chainage_m, 4)],
-    ["clock", (_, p) => p.clock],
+    ["clock", (_, p) => inert(p.clock)],
     ["theta_deg", (_, p) => number(p.theta_deg, 3)],
     ["end_chainage_m", (_, p) => number(p.end_chainage_m, 4)],
-    ["end_clock", (_, p) => p.end_clock ?? ""],
+    ["end_clock", (_, p) => inert(p.end_clock ?? "")],
     ["length_m", (_, p) => number(p.length_m, 4)],
     ["width_mm", (_, p) => number(p.width_mm, 2)],
     ["x_m", (_, p) => number(p.x_m, 4)],
     ["y_m", (_, p) => number(p.y_m, 4)],
     ["z_m", (_, p) => number(p.z_m, 4)],
-    ["note", (_, p) => p.note],
-    ["layer", (_, p) => p.layer],
-    ["created", (_, p) => p.created],
+    ["note", (_, p) => inert(p.note)],
+    ["layer", (_, p) => inert(p.layer)],
+    ["created", (_, p) => inert(p.created)],
   ];
   const quoted = (text: string) => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
   const sorted = [...marks].sort((a, b) => a.properties.chainage_m - b.properties.chainage_m);

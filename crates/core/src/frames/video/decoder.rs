@@ -1,10 +1,12 @@
 //! A sequential decoder of a video: one `ffmpeg` process.
 
 use super::info::{VideoInfo, start_error};
+use super::input::input_arguments;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
+use tunnelstitch_geometry::files::printed;
 
 /// Largest number of `ffmpeg`'s error lines in an error message.
 const MAX_REPORTED_LINES: usize = 2;
@@ -44,7 +46,7 @@ impl Decoder {
             let start = format!("{:.6}", video.seconds(0.5 * (a + b)));
             command.args(["-seek_timestamp", "1", "-ss", &start]);
         }
-        command.arg("-i").arg(&video.path);
+        command.args(input_arguments(&video.path));
         command.args(["-map", "0:v:0", "-fps_mode", "passthrough"]);
         command.args(["-vf", "showinfo=checksum=0"]);
         command.args(["-sws_flags", "bitexact+accurate_rnd+full_chroma_int"]);
@@ -101,7 +103,7 @@ impl Decoder {
                     self.next,
                     video.time_s(self.next),
                     count as f64 / of_a_second as f64,
-                    video.path.display()
+                    printed(&video.path)
                 ));
             }
             self.next += 1;

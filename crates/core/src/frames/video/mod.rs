@@ -7,6 +7,7 @@
 
 mod decoder;
 mod info;
+mod input;
 mod probe;
 mod stream;
 

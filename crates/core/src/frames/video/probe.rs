@@ -1,10 +1,13 @@
 //! Reading of a video's properties with `ffprobe`.
 
 use super::info::{Moment, PixelLayout, VideoInfo, start_error};
+use super::input::{input_arguments, is_refused_format};
 use image::ColorType;
 use serde::Deserialize;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use tunnelstitch_geometry::files::{open_regular, printed};
 
 /// The output of `ffprobe -of json`.
 #[derive(Deserialize)]
@@ -46,6 +49,12 @@ const TRUNCATION_WORDS: [&str; 3] = ["prematurely", "partial file", "truncat"];
 /// # Errors
 /// See [`super::Video::open`].
 pub fn probe(path: &Path) -> Result<VideoInfo, String> {
+    if let Err(error) = open_regular(path) {
+        return Err(match error.kind() {
+            ErrorKind::NotFound => format!("{error}; frames.video is relative to survey.toml"),
+            _ => error.to_string(),
+        });
+    }
     let mut command = Command::new("ffprobe");
     command.args([
         "-v",
@@ -61,7 +70,7 @@ pub fn probe(path: &Path) -> Result<VideoInfo, String> {
          stream_side_data=rotation",
     );
     let output = command
-        .arg(path)
+        .args(input_arguments(path))
         .stdin(Stdio::null())
         .output()
         .map_err(|error| start_error("ffprobe", &error))?;
@@ -69,32 +78,36 @@ pub fn probe(path: &Path) -> Result<VideoInfo, String> {
     // A line may begin with the file's name or the address of a structure.
     let complaint = said.lines().last().map(|line| {
         let line = line.rsplit("] ").next().unwrap_or(line);
-        let name = format!("{}: ", path.display());
+        let name = format!("file:{}: ", path.display());
         line.strip_prefix(&name).unwrap_or(line).trim().to_owned()
     });
     if !output.status.success() {
         let why = complaint.unwrap_or_else(|| "ffprobe cannot read it".to_owned());
-        let remedy = if path.exists() {
-            "it is not a video, is damaged, or was cut off before its end was written: copy it \
-             again"
-        } else {
-            "frames.video is relative to survey.toml"
-        };
-        return Err(format!("{why}; {remedy}"));
+        if is_refused_format(&said) {
+            return Err(
+                "it is a list of other files, or no format of videos that is read; \
+                        frames.video must be the video itself"
+                    .to_owned(),
+            );
+        }
+        return Err(format!(
+            "{why}; it is not a video, is damaged, or was cut off before its end was written: copy \
+             it again"
+        ));
     }
     if TRUNCATION_WORDS.iter().any(|sign| said.contains(sign)) {
         return Err(format!(
             "the video is cut off ({}): copy it again, or recover its intact part with ffmpeg -i \
              {} -c copy whole.mkv",
             complaint.unwrap_or_default(),
-            path.display()
+            printed(path)
         ));
     }
     let probed: Probed = serde_json::from_slice(&output.stdout)
         .map_err(|error| format!("the output of ffprobe cannot be parsed: {error}"))?;
     let video = of(path, probed)?;
     Ok(VideoInfo {
-        warning: complaint.map(|said| format!("{}: ffprobe says: {said}", path.display())),
+        warning: complaint.map(|said| format!("{}: ffprobe says: {said}", printed(path))),
         ..video
     })
 }
@@ -114,7 +127,7 @@ fn of(path: &Path, probed: Probed) -> Result<VideoInfo, String> {
             "is interlaced (field order {order}): its odd and even rows are of different times; \
              make it progressive with ffmpeg -i {} \
              -vf bwdif -c:v libx264 -crf 12 progressive.mp4",
-            path.display()
+            printed(path)
         ));
     }
     let rotation = stream.side_data_list.iter().find_map(|data| data.rotation);
@@ -167,7 +180,7 @@ fn of(path: &Path, probed: Probed) -> Result<VideoInfo, String> {
 fn untimed(path: &Path) -> String {
     format!(
         "has pictures without times; add times with ffmpeg -i {} -c:v libx264 -crf 12 timed.mp4",
-        path.display()
+        printed(path)
     )
 }
 

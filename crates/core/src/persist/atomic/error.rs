@@ -1,10 +1,11 @@
 //! Errors of outputs.
 
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::files::printed;
 
 /// An output that could not be written.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: cannot write: {source}", path.display())]
+#[error("{}: cannot write: {source}", printed(path))]
 pub struct WriteError {
     /// The file or folder.
     pub path: PathBuf,

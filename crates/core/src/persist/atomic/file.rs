@@ -1,10 +1,13 @@
 //! Files that are complete or absent.
 
 use super::error::WriteError;
+use super::error_keeper::ErrorKeeper;
 use super::parent::parent_folder;
 use super::{durable, temporary};
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::Path;
+use tunnelstitch_geometry::files::check_replaceable_file;
 
 /// Writes the file `path` atomically; `fill` writes its content.
 ///
@@ -12,15 +15,20 @@ use std::path::Path;
 /// An error of the operating system about the folder, writing or renaming.
 pub fn write(
     path: &Path,
-    fill: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
+    fill: impl FnOnce(&mut BufWriter<ErrorKeeper<File>>) -> std::io::Result<()>,
 ) -> Result<(), WriteError> {
     let fail = |source| WriteError::new(path, source);
+    check_replaceable_file(path).map_err(fail)?;
     let temporary = temporary::file_in(parent_folder(path)).map_err(fail)?;
-    let mut writer = std::io::BufWriter::new(temporary.file);
-    fill(&mut writer).map_err(fail)?;
+    let mut writer = BufWriter::new(ErrorKeeper::new(temporary.file));
+    let filled = fill(&mut writer);
+    // The cause, if the writer was an encoder with errors of its own.
+    let error = writer.get_mut().error.take();
+    filled.map_err(|other| fail(error.unwrap_or(other)))?;
     let file = writer
         .into_inner()
-        .map_err(|error| fail(error.into_error()))?;
+        .map_err(|error| fail(error.into_error()))?
+        .writer;
     // Files in an unfinished folder are synchronised together with the folder.
     let is_final = !temporary::is_unfinished(path);
     if is_final {
@@ -85,5 +93,19 @@ mod tests {
         assert!(failed.unwrap_err().to_string().contains("disk full"));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_error_of_the_system_is_the_one_reported() {
+        let mut writer = ErrorKeeper::new(File::options().write(true).open("/dev/full").unwrap());
+        let failed = writer
+            .write_all(b"x")
+            .map_err(|_| std::io::Error::other("encoder"));
+        assert!(failed.is_err());
+        assert_eq!(
+            writer.error.unwrap().kind(),
+            std::io::ErrorKind::StorageFull
+        );
     }
 }

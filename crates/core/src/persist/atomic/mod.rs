@@ -8,6 +8,7 @@
 
 mod durable;
 mod error;
+mod error_keeper;
 mod file;
 mod parent;
 mod staged;
@@ -15,6 +16,7 @@ mod temporary;
 
 pub use durable::sync_files;
 pub use error::WriteError;
+pub use error_keeper::ErrorKeeper;
 pub use file::{create_folder, remove_file, write, write_text};
 pub use parent::parent_folder;
 pub use staged::{ScratchFolder, StagedFolder};

@@ -1,6 +1,7 @@
 //! Errors of calibration files.
 
 use crate::camera::lens_error::LensParameterError;
+use crate::files::printed;
 use std::path::PathBuf;
 
 /// An error of a calibration file.
@@ -8,7 +9,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum CalibrationError {
     /// The file cannot be read.
-    #[error("{}: cannot read the calibration: {source}", path.display())]
+    #[error("{}: cannot read the calibration: {source}", printed(path))]
     Read {
         /// The file.
         path: PathBuf,
@@ -16,7 +17,7 @@ pub enum CalibrationError {
         source: std::io::Error,
     },
     /// The content is invalid.
-    #[error("{}:{}{what}", path.display(), line_prefix(*line))]
+    #[error("{}:{}{what}", printed(path), line_prefix(*line))]
     Content {
         /// The file.
         path: PathBuf,

@@ -4,10 +4,15 @@ use super::error::{CalibrationError, ParseError};
 use super::unknown::unknown_calibration;
 use super::{basalt, camodocal, colmap, kalibr, native, nerfstudio, ocamcalib, opencv, value_tree};
 use crate::camera::projection::Camera;
+use crate::files::limits::MAX_CALIBRATION_BYTES;
+use crate::files::read_regular;
 use std::path::Path;
 
 /// Smallest width and height of an image, pixels.
 const MIN_IMAGE_SIDE_PX: u32 = 16;
+/// Smallest and largest focal length, sides of the image. A fisheye of 360° has 0.16 at the least,
+/// a telephoto lens of half a degree 100.
+const FOCAL_SIDES: [f64; 2] = [0.05, 100.0];
 /// Smallest visible fraction of the image; below it, the coefficients are assumed to be wrong.
 const MIN_VISIBLE_FRACTION: f64 = 0.5;
 
@@ -23,10 +28,11 @@ pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, Calib
         line: error.line,
         what: error.what,
     };
-    let bytes = std::fs::read(path).map_err(|source| CalibrationError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes =
+        read_regular(path, MAX_CALIBRATION_BYTES).map_err(|source| CalibrationError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
     let text = String::from_utf8(bytes).map_err(|_| {
         content(ParseError::new(
             "this is not a text file; give the calibration file itself",
@@ -80,10 +86,21 @@ fn validate(camera: Camera) -> Result<Camera, ParseError> {
             camera.width, camera.height
         )));
     }
-    for (name, value) in [("fx", camera.fx), ("fy", camera.fy)] {
+    let sides = [
+        ("fx", camera.fx, camera.width),
+        ("fy", camera.fy, camera.height),
+    ];
+    for (name, value, side_px) in sides {
         if !(value.is_finite() && value > 0.0) {
             return Err(ParseError::new(format!(
                 "{name} is {value}; a focal length in pixels is positive"
+            )));
+        }
+        let [least, most] = FOCAL_SIDES.map(|sides| sides * f64::from(side_px));
+        if !(least..=most).contains(&value) {
+            return Err(ParseError::new(format!(
+                "{name} is {value}; for {side_px} px it must lie between {least} and {most} px: \
+                 check that it is in pixels, not in metres or millimetres"
             )));
         }
     }

@@ -1,0 +1,18 @@
+//! Files that others have made: read only if they are regular files of a limited size, written and
+//! locked never through a symbolic link, and printed with their names escaped.
+//!
+//! | subject | file |
+//! | --- | --- |
+//! | opening and reading of regular files | [`regular`] |
+//! | largest sizes of text files | [`limits`] |
+//! | files that are locked or appended to, and targets that may be replaced | [`targets`] |
+//! | names and texts without control characters | [`printed`] |
+
+pub mod limits;
+pub mod printed;
+pub mod regular;
+pub mod targets;
+
+pub use printed::{escape_controls, printed};
+pub use regular::{open_regular, read_regular, read_text};
+pub use targets::{check_replaceable_file, open_without_links, write_without_links};

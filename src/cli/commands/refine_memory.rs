@@ -1,0 +1,28 @@
+//! Memory that `refine` needs, checked before it begins.
+
+use crate::check::refine_bytes;
+use crate::cli::output::Failure;
+use crate::render::available_bytes;
+use crate::survey::Survey;
+
+/// Memory that refining any survey takes, bytes: threads, windows of frames, and what the frames of
+/// a pyramid take while they are decoded.
+const MIN_FREE_BYTES: u64 = 128 << 20;
+
+/// Refuses to begin what would end without memory, if the system reports how much is free.
+///
+/// # Errors
+/// A temporary [`Failure`] with both numbers.
+pub fn check_memory(survey: &Survey) -> Result<(), Failure> {
+    let needed = refine_bytes(survey) + MIN_FREE_BYTES;
+    match available_bytes() {
+        Some(free) if free < needed => Err(Failure::temporary(format!(
+            "refining {} frames takes some {} MiB of memory, and {} MiB are free; end other \
+             programs, raise the limit (ulimit -v), or refine parts of the survey",
+            survey.frames.len(),
+            needed >> 20,
+            free >> 20
+        ))),
+        _ => Ok(()),
+    }
+}
