@@ -16,8 +16,8 @@ pub enum RefineError {
     /// Poses without motion.
     #[error(
         "all {frames} initial poses are equal, so that they say nothing about where the frames \
-         lie; give the motion of the camera: `tunnelstitch plan` writes poses from the advance and the \
-         angle of a step, `tunnelstitch gyro` from the log of a gyroscope"
+         lie; give the motion of the camera: `tunnelstitch plan` writes poses from the advance and \
+         the angle of a step, `tunnelstitch gyro` from the log of a gyroscope"
     )]
     NoMotion {
         /// Number of frames.
