@@ -2,8 +2,7 @@
 //! what to do about them.
 //!
 //! Up to 64 frames are decoded; of the others only the headers are read.
-//! Everything else is geometry
-//! of the initial poses.
+//! Everything else is geometry of the initial poses.
 //!
 //! ```text
 //! Survey ─┬─ MaskCheck, PosesCheck, OverlapCheck, JitterCheck ─┐

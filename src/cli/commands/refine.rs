@@ -188,7 +188,6 @@ pub fn run(
     let options = arguments.options();
     let points = arguments.points.as_deref();
     let mut survey = (arguments.reading).open(&arguments.survey, points, terminal)?;
-    let overlay = leave_out_overlay(&mut survey, arguments.json, terminal)?;
     let inputs = record::hash_survey(&survey, None)?;
     let origin = resume::origin(&survey, &options, inputs.clone())?;
     let say = |text: &str| {
@@ -200,6 +199,8 @@ pub fn run(
     atomic::create_folder(&arguments.out)?;
     let result = arguments.out.join("refine");
     let (refined, json) = arguments.resume.run(&result, &origin, say, |checkpoint| {
+        // After the check that the run to be continued is of the same frames.
+        let overlay = leave_out_overlay(&mut survey, arguments.json, terminal)?;
         let done = refine_into(
             &survey,
             &overlay,

@@ -139,7 +139,7 @@ impl Survey {
 
 /// True if frames of these comb ratios are interlaced.
 ///
-/// The rate of false alarms is below 10⁻⁶: frames of progressive pictures have ratios below 1,
+/// The nominal rate of false alarms is below 10⁻⁶: progressive frames have ratios below 1,
 /// those of nothing but noise 1 with a standard deviation of 0.02 (at 320 × 240 px), six of which
 /// the median of four frames or more would have to deviate by.
 fn is_interlaced(ratios: &[f64]) -> bool {

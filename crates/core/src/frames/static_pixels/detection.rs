@@ -23,9 +23,9 @@ pub enum StaticPixels {
 
 /// Finds the pixels that do not move with the wall.
 ///
-/// The rate of false alarms is below 10⁻³ per survey. The ridges of the wall's temporal mean are
+/// The nominal rate of false alarms is 10⁻⁵ per survey. The ridges of the wall's temporal mean are
 /// nearly Gaussian, being means over many frames; at seven standard deviations, a picture of
-/// 480 × 360 px with three scales and two directions has a nominal rate of 10⁻⁵, and three such
+/// 480 × 360 px with three scales and two directions has one of that rate, and three such
 /// pixels side by side are needed.
 pub fn find_static_pixels(statistics: &TemporalStatistics, motion: &MotionField) -> StaticPixels {
     let [width, height] = statistics.size();
