@@ -2,9 +2,9 @@
 //!
 //! A wrong convention places cameras outside, makes them look along the axis while they revolve, or
 //! makes them move and rotate along another direction. (A camera that does not revolve may look
-//! along the axis: the usual one of a sewer robot does.) In these cases other conventions are tried, the simplest
-//! first, and the plausible one is named with its flag. A wrong convention that leaves all cameras
-//! inside and looking at the wall can only be detected from the images
+//! along the axis: the usual one of a sewer robot does.) In these cases other conventions are
+//! tried, the simplest first, and the plausible one is named with its flag. A wrong convention that
+//! leaves all cameras inside and looking at the wall can only be detected from the images
 //! ([`Survey::pose_convention_variants`](crate::survey::Survey::pose_convention_variants)).
 
 use super::error::SurveyError;

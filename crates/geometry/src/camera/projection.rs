@@ -31,8 +31,8 @@ pub struct Camera {
     pub lens: Lens,
     /// The camera's motion during the readout of an image, different for each frame of a survey.
     pub sweep: Sweep,
-    /// Distance from the camera up to which the wall is used, metres; beyond, a pixel shows too much
-    /// of it to tell anything.
+    /// Distance from the camera up to which the wall is used, metres; beyond, a pixel shows too
+    /// much of it to tell anything.
     pub max_range_m: f64,
 }
 

@@ -8,8 +8,8 @@ use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Footprint;
 use tunnelstitch_geometry::trajectory::Pose;
 
-/// Distance up to which a camera on the axis resolves the wall, radii of a circle with the section's
-/// perimeter.
+/// Distance up to which a camera on the axis resolves the wall, radii of a circle with the
+/// section's perimeter.
 ///
 /// At an angle φ to the section `cos³ φ` of the pixels are left: the share
 /// [`crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA`] at `tan φ = √(0.05^(−2/3) − 1)` =

@@ -2,8 +2,8 @@
 //!
 //! A brick wall correlates with itself over a fraction of a brick only, and the prior is wider than
 //! that. So before a frame is refined, it is compared with the reference mosaic over the whole
-//! width of the prior. The frame is unwrapped under a few turns of the camera ([`SearchGrid`]); each
-//! picture is correlated with the mosaic over all shifts at once, by Fourier transform
+//! width of the prior. The frame is unwrapped under a few turns of the camera ([`SearchGrid`]);
+//! each picture is correlated with the mosaic over all shifts at once, by Fourier transform
 //! ([`Correlator`]). The best maxima are the hypotheses.
 //!
 //! The score of a hypothesis is its log-posterior with exposure and noise profiled out:

@@ -144,11 +144,11 @@ mod tests {
     use tunnelstitch_core::test_wall::{TestWall, waves};
     use tunnelstitch_geometry::trajectory::spiral;
 
-    /// Two and a half turns past a wall in a light that depends on the pixel, and exposures that
+    /// Five turns past a wall in a light that depends on the pixel, and exposures that
     /// depend on the frame.
     fn corrected(light: fn(f64, f64) -> f64) -> Option<impl Fn(f64, f64) -> f64> {
         let mut wall = TestWall::ring(waves);
-        wall.poses = spiral(30, 0.05, 30f64.to_radians());
+        wall.poses = spiral(60, 0.05, 30f64.to_radians());
         let pictures = wall.frames().into_iter().enumerate().map(|(k, frame)| {
             let (w, h) = (frame.width(), frame.height());
             let gain = 1.0 + 0.2 * (1.7 * k as f64).sin();
