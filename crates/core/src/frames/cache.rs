@@ -51,7 +51,7 @@ pub enum Light {
     #[default]
     Even,
     /// Divided by a shading that all frames have in common.
-    Shaded(Shading),
+    Shaded(Box<Shading>),
     /// Taken off by local normalisation ([`normalise_locally`]).
     Normalised,
 }
@@ -145,7 +145,7 @@ impl FrameCache {
     /// The shading by which frames are divided.
     pub fn shading(&self) -> Option<Shading> {
         match self.light() {
-            Light::Shaded(shading) => Some(shading),
+            Light::Shaded(shading) => Some(*shading),
             Light::Even | Light::Normalised => None,
         }
     }

@@ -20,7 +20,7 @@ pub fn run<'a>(
     let coarsest = setup.coarsest_level();
     let prescreened = prescreening::prescreen(&context, coarsest, session.progress.as_ref())?;
     if let (Light::Even, Some(shading)) = (setup.frames.light(), prescreened.shading) {
-        setup.frames.set_light(Light::Shaded(shading));
+        setup.frames.set_light(Light::Shaded(Box::new(shading)));
     }
     estimation.state.noise = prescreened.noise;
     estimation.state.frames.rejections = prescreened.rejections;

@@ -87,7 +87,7 @@ fn correct(context: &EstimationContext, points: &[Vec<Observation>], count: usiz
         context.camera.height as usize,
     );
     let (before, sigmas) = match context.frames.light() {
-        Light::Shaded(shading) => (shading, MIN_CHANGE_SIGNIFICANCE_SIGMA),
+        Light::Shaded(shading) => (*shading, MIN_CHANGE_SIGNIFICANCE_SIGMA),
         Light::Even => (Shading::none(size), MIN_SIGNIFICANCE_SIGMA),
         Light::Normalised => return false,
     };
@@ -97,7 +97,7 @@ fn correct(context: &EstimationContext, points: &[Vec<Observation>], count: usiz
         return false;
     };
     let shading = before.changed(&found.shading);
-    context.frames.set_light(Light::Shaded(shading));
+    context.frames.set_light(Light::Shaded(Box::new(shading)));
     true
 }
 
