@@ -22,6 +22,7 @@ mod panorama;
 mod plan;
 mod points;
 mod poses;
+mod real_light_and_views;
 mod real_pictures;
 mod refine;
 mod report;

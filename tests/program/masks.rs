@@ -32,8 +32,8 @@ fn without_its_mask(survey: &Path) {
     );
 }
 
-/// Refines a survey with its wall as given: what may hide in a deformation that is not seen varies by
-/// more than a mask costs. Returns `refine.json` and the error on the wall, pixels.
+/// Refines a survey with its wall as given: what may hide in a deformation that is not seen varies
+/// by more than a mask costs. Returns `refine.json` and the error on the wall, pixels.
 fn refined(survey: &Path) -> (Value, f64) {
     let out = survey.join("refined");
     let json = succeed(&[
