@@ -6,7 +6,7 @@
 //! | opening and reading of regular files | [`regular`] |
 //! | largest sizes of text files | [`limits`] |
 //! | files that are locked or appended to, and targets that may be replaced | [`targets`] |
-//! | names and texts without control characters | [`printed`] |
+//! | names and texts without control characters | [`printed()`] |
 
 pub mod limits;
 pub mod printed;
