@@ -105,7 +105,9 @@ fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str) {
     exact_as_said(dir.path(), refined, initial);
 }
 
-/// The wall error, pixels, is at most three times the 1-σ of `refine`, which is small.
+/// The wall error, pixels, is at most three times the 1-σ of `refine`, which is at most a fiftieth of
+/// the error before: it contains what may hide in a deformation that frames do not see, and with it
+/// varies from seed to seed.
 fn exact_as_said(folder: &Path, refined: f64, initial: f64) {
     let json = json(&folder.join("refined/refine.json"));
     let frames = json["frames"].as_array().unwrap();
@@ -114,7 +116,7 @@ fn exact_as_said(folder: &Path, refined: f64, initial: f64) {
         .map(|frame| frame["sigma"]["wall_px"].as_f64().unwrap());
     let sigma = sigmas.sum::<f64>() / frames.len() as f64;
     assert!(
-        initial > 10.0 && sigma < 0.3,
+        initial > 10.0 && sigma < 0.02 * initial,
         "{initial} px before, 1-σ {sigma} px"
     );
     assert!(refined < 3.0 * sigma, "{refined} px, 1-σ {sigma} px");
