@@ -105,9 +105,9 @@ fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str) {
     exact_as_said(dir.path(), refined, initial);
 }
 
-/// The wall error, pixels, is at most three times the 1-σ of `refine`, which is at most a fiftieth of
-/// the error before: it contains what may hide in a deformation that frames do not see, and with it
-/// varies from seed to seed.
+/// The wall error, pixels, is at most three times the 1-σ of `refine`, which is at most a fiftieth
+/// of the error before: it contains what may hide in a deformation that frames do not see, and with
+/// it varies from seed to seed.
 fn exact_as_said(folder: &Path, refined: f64, initial: f64) {
     let json = json(&folder.join("refined/refine.json"));
     let frames = json["frames"].as_array().unwrap();
