@@ -17,11 +17,11 @@ use crate::survey::{Overlay, Survey};
 /// Checks a survey without refining it.
 ///
 /// # Errors
-/// A camera that looks along the tunnel's axis, in whose image nothing can be measured.
+/// A camera that shows no wall at all.
 pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     let poses = survey.initial_poses();
     let surface = survey.surface.as_ref();
-    // Opening a survey checks its poses, so a failure means a camera that looks along the axis.
+    // Opening a survey checks its poses, so a failure means a camera that shows no wall.
     let px_per_metre = native_px_per_metre(surface, &survey.camera, &poses)
         .map_err(|_| SurfaceError::LooksAlongTheAxis)?;
     let overlap = OverlapCheck::of(survey, &poses);
@@ -29,9 +29,9 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     let overlay = match survey.find_overlay() {
         Ok(overlay) => overlay,
         Err(error) => {
-            let fault = error.to_string();
-            if !faults.contains(&fault) && faults.is_empty() {
-                faults.push(fault);
+            // A frame that cannot be read is among the faults already, if it was looked at.
+            if faults.is_empty() {
+                faults.push(error.to_string());
             }
             Overlay::default()
         }
@@ -44,7 +44,7 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     if survey.frames.len() < 2 {
         faults.push("there is one frame; refine needs two that overlap".to_owned());
     }
-    if survey.frames.len() > 1 && is_motionless(&survey.initial) {
+    if is_motionless(&survey.initial) {
         faults.push(
             "all initial poses are equal; refine needs the motion of the camera (tunnelstitch plan \
              and gyro write poses)"

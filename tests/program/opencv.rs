@@ -1,7 +1,7 @@
 //! The camera models against reference values of OpenCV (`fixtures/opencv/make.py`).
 
 use nalgebra::Vector3;
-use tunnelstitch::camera::{BrownCoefficients, BrownConrady, Camera, KannalaBrandt, Lens, Sweep};
+use tunnelstitch::camera::{BrownCoefficients, BrownConrady, Camera, KannalaBrandt, Lens};
 
 /// The lens with a given name in `make.py`.
 fn lens(model: &str) -> Lens {
@@ -24,17 +24,7 @@ fn projections_agree_with_opencv() {
     for line in text.lines().skip(2) {
         let (model, numbers) = line.split_once(',').unwrap();
         let numbers: Vec<f64> = numbers.split(',').map(|n| n.parse().unwrap()).collect();
-        let camera = Camera {
-            width: 640,
-            height: 480,
-            fx: 415.25,
-            fy: 417.5,
-            cx: 318.75,
-            cy: 241.125,
-            lens: lens(model),
-            sweep: Sweep::default(),
-            max_range_m: f64::INFINITY,
-        };
+        let camera = Camera::at_rest([640, 480], [415.25, 417.5], [318.75, 241.125], lens(model));
         let x_c = Vector3::new(numbers[0], numbers[1], numbers[2]);
         let pixel = camera.project(&x_c).unwrap();
         let apart = (pixel.x - numbers[3]).hypot(pixel.y - numbers[4]);

@@ -134,11 +134,10 @@ impl NormalEquations {
         let n = self.right.len();
         let matrix = SparseColMat::try_new_from_triplets(n, n, &self.lower(priors, variance));
         let factor = matrix.ok()?.sp_cholesky(Side::Lower).ok()?;
-        let shading_prior = variance / (priors.shading_sigma * priors.shading_sigma);
         let shading = self.border.len();
-        let x = factor.solve(&Col::from_fn(n, |k| {
-            let known = k.checked_sub(shading).map_or(0.0, |term| known[term]);
-            self.right[k] - shading_prior * known
+        let x = factor.solve(&Col::from_fn(n, |k| match k.checked_sub(shading) {
+            Some(term) => self.right[k] - self.prior(priors, variance, k) * known[term],
+            None => self.right[k],
         }));
         if !x.iter().all(|value| value.is_finite()) {
             return None;
@@ -154,18 +153,21 @@ impl NormalEquations {
         })
     }
 
+    /// The entry of `σ² P` of unknown k.
+    fn prior(&self, priors: &Priors, variance: f64, k: usize) -> f64 {
+        let own = [priors.log_gain_sigma, priors.bias_sigma_grey];
+        let sigma = if k < self.border.len() {
+            own[k % FRAME_UNKNOWNS]
+        } else {
+            priors.shading_sigma
+        };
+        variance / (sigma * sigma)
+    }
+
     /// Entries of the lower triangle of `N + σ² P`.
     fn lower(&self, priors: &Priors, variance: f64) -> Vec<Triplet<usize, usize, f64>> {
         let border = self.border.len();
-        let own = [priors.log_gain_sigma, priors.bias_sigma_grey];
-        let prior = |k: usize| {
-            let sigma = if k < border {
-                own[k % FRAME_UNKNOWNS]
-            } else {
-                priors.shading_sigma
-            };
-            variance / (sigma * sigma)
-        };
+        let prior = |k: usize| self.prior(priors, variance, k);
         let diagonal = (0..self.right.len()).map(|k| Triplet::new(k, k, prior(k)));
         let mut entries: Vec<Triplet<usize, usize, f64>> = diagonal.collect();
         let pairs = self.pairs.iter().enumerate();

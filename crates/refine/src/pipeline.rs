@@ -93,18 +93,15 @@ fn fits_light(stage: Stage, ended: &Estimation) -> bool {
     if !ended.state.has_common_light {
         return false;
     }
-    let rejections = match (stage, &ended.refined) {
-        (_, Some(refined)) => {
-            return refined.report.frames_on_prior * 2 <= refined.report.frames.len();
-        }
-        (Stage::Track, None) => &ended.state.frames.rejections,
-        _ => return true,
-    };
+    if let Some(refined) = &ended.refined {
+        return refined.report.frames_on_prior * 2 <= refined.report.frames.len();
+    }
+    let rejections = &ended.state.frames.rejections;
     let shown = rejections
         .iter()
         .filter(|reason| !reason.as_ref().is_some_and(RejectionReason::shows_nothing));
     let registered = rejections.iter().filter(|reason| reason.is_none()).count();
-    2 * registered >= shown.count()
+    stage != Stage::Track || 2 * registered >= shown.count()
 }
 
 /// The state before the first stage.

@@ -2,6 +2,7 @@
 
 use super::grey::GreyImage;
 use super::noise::MAD_TO_SIGMA;
+use super::windows::{Moments, Windows};
 
 /// Half width of the largest window relative to the image's shorter side.
 const WINDOW_FRACTION: f64 = 1.0 / 8.0;
@@ -37,7 +38,7 @@ const MAX_DETAIL_SIGMAS: f32 = 1.5;
 pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
     let w = image.width();
     let values = clip_detail(image, reach, MAX_DETAIL_SIGMAS);
-    let windows = Windows::new(&values, w, reach);
+    let windows = Windows::new(&values, w, [reach; 2]);
     let moments: Vec<Moments> = windows.moments().collect();
     let overall = moments.iter().map(|m| m.variance).sum::<f32>() / moments.len().max(1) as f32;
     let floor = MIN_SPREAD_FRACTION * MIN_SPREAD_FRACTION * overall + 1e-6;
@@ -66,7 +67,7 @@ fn clip_detail(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
 /// The means over windows of `2 reach + 1` pixels, and the robust σ of the deviations from them (0
 /// for an image without values).
 fn detail(image: &GreyImage, reach: usize) -> (Vec<f32>, f32) {
-    let windows = Windows::new(image.data(), image.width(), reach);
+    let windows = Windows::new(image.data(), image.width(), [reach; 2]);
     let means: Vec<f32> = windows.moments().map(|m| m.mean).collect();
     let pixels = image.data().iter().zip(&means);
     let mut sizes: Vec<f32> = pixels
@@ -112,76 +113,6 @@ pub fn mask_outliers(image: &GreyImage) -> GreyImage {
 /// Largest detail of an inlier, multiples of the robust σ; less than the bound of
 /// [`clip_outliers`].
 const MAX_KEPT_SIGMAS: f32 = 2.5;
-
-/// Mean and variance of the values in a window.
-struct Moments {
-    mean: f32,
-    variance: f32,
-}
-
-/// Moments in square windows around all pixels, by integral images.
-struct Windows {
-    width: usize,
-    height: usize,
-    reach: usize,
-    /// A grey level near the mean, subtracted before summing.
-    level: f32,
-    /// Integral images of 1, I, I².
-    sums: Vec<[f64; 3]>,
-}
-
-impl Windows {
-    fn new(values: &[f32], width: usize, reach: usize) -> Self {
-        let height = values.len() / width;
-        let known = values.iter().filter(|v| !v.is_nan());
-        let level = known.clone().sum::<f32>() / known.count().max(1) as f32;
-        let mut sums = vec![[0.0f64; 3]; (width + 1) * (height + 1)];
-        for y in 0..height {
-            let mut row = [0.0f64; 3];
-            for x in 0..width {
-                let value = f64::from(values[y * width + x] - level);
-                if !value.is_nan() {
-                    row[0] += 1.0;
-                    row[1] += value;
-                    row[2] += value * value;
-                }
-                let above = sums[y * (width + 1) + x + 1];
-                sums[(y + 1) * (width + 1) + x + 1] = std::array::from_fn(|k| above[k] + row[k]);
-            }
-        }
-        Self {
-            width,
-            height,
-            reach,
-            level,
-            sums,
-        }
-    }
-
-    /// Moments around every pixel, row by row.
-    fn moments(&self) -> impl Iterator<Item = Moments> + '_ {
-        let at = |x: usize, y: usize| &self.sums[y * (self.width + 1) + x];
-        (0..self.width * self.height).map(move |k| {
-            let (x, y) = (k % self.width, k / self.width);
-            let (x0, x1) = (
-                x.saturating_sub(self.reach),
-                (x + self.reach + 1).min(self.width),
-            );
-            let (y0, y1) = (
-                y.saturating_sub(self.reach),
-                (y + self.reach + 1).min(self.height),
-            );
-            let (a, b, c, d) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
-            let sum: [f64; 3] = std::array::from_fn(|k| d[k] - b[k] - c[k] + a[k]);
-            let n = sum[0].max(1.0);
-            let mean = sum[1] / n;
-            Moments {
-                mean: self.level + mean as f32,
-                variance: (sum[2] / n - mean * mean).max(0.0) as f32,
-            }
-        })
-    }
-}
 
 #[cfg(test)]
 mod tests {

@@ -15,6 +15,7 @@
 
 use super::grey::GreyImage;
 use super::noise::noise_sigma;
+use super::windows::Windows;
 
 /// Half height of the window of the mean over the frame's shorter side: a standard deviation of a
 /// 72nd, for two passes.
@@ -36,81 +37,39 @@ const CLIPPED_GREY: f32 = 252.0;
 /// Share of clipped pixels in the window of the mean from which on that is not known.
 const MAX_CLIPPED_SHARE: f32 = 0.05;
 
-/// Normalises a frame locally. Pixels without a value have none (NaN), and
-/// neither have those of whose surroundings much is clipped, where the mean is not known.
+/// Normalises a frame locally. Pixels without a value have none (NaN), and neither have those of
+/// whose surroundings much is clipped, where the mean is not known.
 pub fn normalise_locally(image: &GreyImage) -> GreyImage {
     let (width, height) = (image.width(), image.height());
     let is_clipped = |value: &f32| *value >= CLIPPED_GREY;
     let known = image.data().iter();
     let known = known.map(|value| if is_clipped(value) { f32::NAN } else { *value });
     let known: Vec<f32> = known.collect();
-    let clipped = image
-        .data()
-        .iter()
-        .map(|value| f32::from(u8::from(is_clipped(value))));
-    let clipped: Vec<f32> = clipped.collect();
+    let clipped = image.data().iter().map(is_clipped);
+    let clipped: Vec<f32> = clipped
+        .map(|clipped| f32::from(u8::from(clipped)))
+        .collect();
     let reach = |share: f64| ((share * width.min(height) as f64).round() as usize).max(1);
     let half_height = reach(MEAN_HALF_HEIGHT);
     let mean_window = [(MEAN_ASPECT * half_height as f64) as usize, half_height];
     let half_side = reach(SPREAD_HALF_SIDE);
-    let mean = local_mean(&local_mean(&known, width, mean_window), width, mean_window);
+    let means = |values: &[f32], window| Windows::new(values, width, window).means();
+    let mean = means(&means(&known, mean_window), mean_window);
     let detail: Vec<f32> = known.iter().zip(&mean).map(|(v, m)| v - m).collect();
     let squares: Vec<f32> = detail.iter().map(|d| d * d).collect();
-    let variance = local_mean(&squares, width, [half_side; 2]);
+    let variance = means(&squares, [half_side; 2]);
     let noise = noise_sigma(image).map_or(MIN_NOISE_GREY, |sigma| sigma as f32);
     let floor = NOISE_WEIGHT * noise.max(MIN_NOISE_GREY);
-    let clipped = local_mean(&clipped, width, mean_window);
+    let clipped = means(&clipped, mean_window);
     let normalised = detail.iter().zip(variance.iter().zip(&clipped));
     let normalised = normalised.map(|(d, (variance, clipped))| {
         if *clipped < MAX_CLIPPED_SHARE {
-            MIDDLE_GREY + SPREAD_GREY * d / (variance.sqrt() + floor)
+            MIDDLE_GREY + SPREAD_GREY * d / (variance.max(0.0).sqrt() + floor)
         } else {
             f32::NAN
         }
     });
     GreyImage::new(width, height, normalised.collect())
-}
-
-/// Mean over a window of `2 reach + 1` pixels along x and y around every pixel, of those that have
-/// a value; NaN where none has.
-fn local_mean(values: &[f32], width: usize, [reach_x, reach_y]: [usize; 2]) -> Vec<f32> {
-    let rows: Vec<[f64; 2]> = values
-        .chunks_exact(width)
-        .flat_map(|row| {
-            let sums = row.iter().map(|value| match value.is_nan() {
-                true => [0.0, 0.0],
-                false => [f64::from(*value), 1.0],
-            });
-            windowed_sums(&sums.collect::<Vec<_>>(), reach_x)
-        })
-        .collect();
-    let height = values.len() / width;
-    let mut means = vec![f32::NAN; values.len()];
-    for x in 0..width {
-        let column: Vec<[f64; 2]> = (0..height).map(|y| rows[y * width + x]).collect();
-        for (y, [sum, count]) in windowed_sums(&column, reach_y).into_iter().enumerate() {
-            if count > 0.0 {
-                means[y * width + x] = (sum / count) as f32;
-            }
-        }
-    }
-    means
-}
-
-/// Sums over `2 reach + 1` entries around every entry.
-fn windowed_sums(values: &[[f64; 2]], reach: usize) -> Vec<[f64; 2]> {
-    let mut cumulative = vec![[0.0; 2]];
-    let mut sum = [0.0; 2];
-    for value in values {
-        sum = [sum[0] + value[0], sum[1] + value[1]];
-        cumulative.push(sum);
-    }
-    let window = |k: usize| {
-        let from = cumulative[k.saturating_sub(reach)];
-        let to = cumulative[(k + reach + 1).min(values.len())];
-        [to[0] - from[0], to[1] - from[1]]
-    };
-    (0..values.len()).map(window).collect()
 }
 
 #[cfg(test)]

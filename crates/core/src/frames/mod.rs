@@ -18,6 +18,7 @@ mod shading;
 mod static_pixels;
 mod stored_frame;
 mod video;
+mod windows;
 mod write;
 
 pub use cache::{FrameCache, Light};

@@ -1,9 +1,10 @@
 //! The double sphere model.
 
+use super::field_of_view::FieldOfView;
 use super::lens_error::LensParameterError;
 use super::quotient::quotient_jacobian;
+use super::sphere_share::{fold_share, lifted_depth};
 use nalgebra::{Matrix2x3, RowVector3, Vector2, Vector3};
-use std::f64::consts::PI;
 
 /// Projection through two unit spheres and a plane: `p_d = (x, y)/(α d₂ + (1 − α) k)` with
 /// `k = ξ d₁ + z`, `d₁ = |x_c|`, `d₂ = √(x² + y² + k²)`.
@@ -16,7 +17,7 @@ use std::f64::consts::PI;
 /// `cos θ = −ξ (1 − w₁²) − w₁ √(1 − ξ² (1 − w₁²))`,
 ///
 /// and, for ξ > 1, up to `cos θ = −1/ξ`, where φ is largest. The field of view ends there
-/// ([`DoubleSphere::limit_rad`]). (The bound on z in the paper is that of another angle; it is the
+/// ([`FieldOfView::limit_rad`]). (The bound on z in the paper is that of another angle; it is the
 /// same for ξ = 0.)
 ///
 /// Source: V. Usenko, N. Demmel, D. Cremers, "The double sphere camera model", 3DV 2018.
@@ -24,11 +25,7 @@ use std::f64::consts::PI;
 pub struct DoubleSphere {
     xi: f64,
     alpha: f64,
-    /// Largest angle off the axis to be used, radians.
-    max_angle_rad: f64,
-    limit_rad: f64,
-    /// Cosine of `limit_rad`.
-    min_cos: f64,
+    field_of_view: FieldOfView,
 }
 
 impl DoubleSphere {
@@ -41,43 +38,29 @@ impl DoubleSphere {
         LensParameterError::unless(is_distance, "xi", xi, "be a number above -1")?;
         let is_share = (0.0..=1.0).contains(&alpha);
         LensParameterError::unless(is_share, "alpha", alpha, "lie between 0 and 1")?;
-        let w = if alpha <= 0.5 {
-            alpha / (1.0 - alpha)
-        } else {
-            (1.0 - alpha) / alpha
-        };
+        let w = fold_share(alpha);
         let outside = 1.0 - w * w;
         let min_cos = if xi > 1.0 {
             -1.0 / xi
         } else {
             -xi * outside - w * (1.0 - xi * xi * outside).sqrt()
         };
-        let limit_rad = min_cos.clamp(-1.0, 1.0).acos();
         Ok(Self {
             xi,
             alpha,
-            max_angle_rad: PI,
-            limit_rad,
-            min_cos,
+            field_of_view: FieldOfView::down_to(min_cos),
         })
     }
 
     /// This lens, limited to `max_angle_rad` off its axis.
     pub fn limited_to(mut self, max_angle_rad: f64) -> Self {
-        self.max_angle_rad = max_angle_rad.min(PI);
-        self.limit_rad = self.limit_rad.min(self.max_angle_rad);
-        self.min_cos = self.min_cos.max(self.max_angle_rad.cos());
+        self.field_of_view = self.field_of_view.limited_to(max_angle_rad);
         self
     }
 
-    /// The largest angle off the axis to be used, radians; 180° if there is no limit.
-    pub fn max_angle_rad(&self) -> f64 {
-        self.max_angle_rad
-    }
-
-    /// The limit of the field of view: the largest angle off the axis, radians.
-    pub fn limit_rad(&self) -> f64 {
-        self.limit_rad
+    /// The directions that it shows.
+    pub fn field_of_view(&self) -> &FieldOfView {
+        &self.field_of_view
     }
 
     /// ξ and α.
@@ -92,7 +75,7 @@ impl DoubleSphere {
 
     /// Projects a point; None beyond the limit.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
-        let is_shown = x_c.z > self.min_cos * x_c.norm();
+        let is_shown = self.field_of_view.shows(x_c);
         let (denominator, _) = self.denominator(x_c);
         (is_shown && denominator > 0.0).then(|| x_c.xy() / denominator)
     }
@@ -121,12 +104,11 @@ impl DoubleSphere {
     /// `(m ξ + √(m² + (1 − ξ²) r²))/(m² + r²) (p_d, m) − (0, 0, ξ)`.
     pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
         let (xi, alpha, square) = (self.xi, self.alpha, p_d.norm_squared());
-        let root = (1.0 - (2.0 * alpha - 1.0) * square).sqrt();
-        let m = (1.0 - alpha * alpha * square) / (alpha * root + 1.0 - alpha);
+        let m = lifted_depth(alpha, square);
         let far = m * m + square;
         let scale = (m * xi + (m * m + (1.0 - xi * xi) * square).sqrt()) / far;
         let ray = (p_d * scale).push(m * scale - xi);
         // A root of a negative number is not shown, either.
-        (ray.z > self.min_cos).then_some(ray)
+        self.field_of_view.shows_ray(&ray).then_some(ray)
     }
 }

@@ -1,15 +1,16 @@
 //! The enhanced unified camera model.
 
+use super::field_of_view::FieldOfView;
 use super::lens_error::LensParameterError;
 use super::quotient::quotient_jacobian;
+use super::sphere_share::{fold_share, lifted_depth};
 use nalgebra::{Matrix2x3, RowVector3, Vector2, Vector3};
-use std::f64::consts::PI;
 
 /// Projection through an ellipsoid and a plane: `p_d = (x, y)/(α d + (1 − α) z)`,
 /// `d = √(β (x² + y²) + z²)`.
 ///
 /// The radius rises up to `z = −w d`, `w = α/(1 − α)` for α ≤ ½ and `(1 − α)/α` above: the field of
-/// view ends at the angle `atan2(√((1 − w²)/β), −w)` ([`Eucm::limit_rad`]).
+/// view ends at the angle `atan2(√((1 − w²)/β), −w)` ([`FieldOfView::limit_rad`]).
 ///
 /// Source: B. Khomutenko, G. Garcia, P. Martinet, "An enhanced unified camera model", RA-L 1(1),
 /// 2016; the field of view: V. Usenko, N. Demmel, D. Cremers, "The double sphere camera model", 3DV
@@ -18,11 +19,7 @@ use std::f64::consts::PI;
 pub struct Eucm {
     alpha: f64,
     beta: f64,
-    /// Largest angle off the axis to be used, radians.
-    max_angle_rad: f64,
-    limit_rad: f64,
-    /// Cosine of `limit_rad`.
-    min_cos: f64,
+    field_of_view: FieldOfView,
 }
 
 impl Eucm {
@@ -35,37 +32,24 @@ impl Eucm {
         LensParameterError::unless(is_share, "alpha", alpha, "lie between 0 and 1")?;
         let is_stretch = beta.is_finite() && beta > 0.0;
         LensParameterError::unless(is_stretch, "beta", beta, "be a positive number")?;
-        let w = if alpha <= 0.5 {
-            alpha / (1.0 - alpha)
-        } else {
-            (1.0 - alpha) / alpha
-        };
+        let w = fold_share(alpha);
         let limit_rad = ((1.0 - w * w) / beta).sqrt().atan2(-w);
         Ok(Self {
             alpha,
             beta,
-            max_angle_rad: PI,
-            limit_rad,
-            min_cos: limit_rad.cos(),
+            field_of_view: FieldOfView::up_to(limit_rad),
         })
     }
 
     /// This lens, limited to `max_angle_rad` off its axis.
     pub fn limited_to(mut self, max_angle_rad: f64) -> Self {
-        self.max_angle_rad = max_angle_rad.min(PI);
-        self.limit_rad = self.limit_rad.min(self.max_angle_rad);
-        self.min_cos = self.limit_rad.cos();
+        self.field_of_view = self.field_of_view.limited_to(max_angle_rad);
         self
     }
 
-    /// The largest angle off the axis to be used, radians; 180° if there is no limit.
-    pub fn max_angle_rad(&self) -> f64 {
-        self.max_angle_rad
-    }
-
-    /// The limit of the field of view: the largest angle off the axis, radians.
-    pub fn limit_rad(&self) -> f64 {
-        self.limit_rad
+    /// The directions that it shows.
+    pub fn field_of_view(&self) -> &FieldOfView {
+        &self.field_of_view
     }
 
     /// α and β.
@@ -75,7 +59,7 @@ impl Eucm {
 
     /// Projects a point; None beyond the limit.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
-        let is_shown = x_c.z > self.min_cos * x_c.norm();
+        let is_shown = self.field_of_view.shows(x_c);
         let (denominator, _) = self.denominator(x_c);
         (is_shown && denominator > 0.0).then(|| x_c.xy() / denominator)
     }
@@ -102,10 +86,9 @@ impl Eucm {
     /// `m = (1 − β α² r²)/(α √(1 − (2α − 1) β r²) + 1 − α)`; None beyond the limit.
     pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
         let (alpha, square) = (self.alpha, self.beta * p_d.norm_squared());
-        let root = (1.0 - (2.0 * alpha - 1.0) * square).sqrt();
-        let m = (1.0 - alpha * alpha * square) / (alpha * root + 1.0 - alpha);
+        let m = lifted_depth(alpha, square);
         let ray = p_d.push(m).normalize();
         // A root of a negative number is not shown, either.
-        (ray.z > self.min_cos).then_some(ray)
+        self.field_of_view.shows_ray(&ray).then_some(ray)
     }
 }

@@ -1,5 +1,6 @@
 //! The Kannala–Brandt fisheye model.
 
+use super::field_of_view::FieldOfView;
 use super::monotone::{invert_monotone, monotone_limit};
 use super::radial::{is_on_axis, project_radial, radial_jacobian, radial_ray};
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
@@ -10,16 +11,14 @@ use std::f64::consts::PI;
 /// direction: `p_d = θ_d (x, y)/√(x² + y²)`.
 ///
 /// OpenCV calls this model `fisheye`, ROS and Kalibr "equidistant". Points may lie beside and
-/// behind the camera, up to the angle [`KannalaBrandt::limit_rad`], within which θ_d rises.
+/// behind the camera, up to the angle [`FieldOfView::limit_rad`], within which θ_d rises.
 ///
 /// Source: J. Kannala and S. S. Brandt, "A generic camera model and calibration method for
 /// conventional, wide-angle, and fish-eye lenses", PAMI 28(8), 2006.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KannalaBrandt {
     k: [f64; 4],
-    /// Largest angle off the axis to be used, radians.
-    max_angle_rad: f64,
-    limit_rad: f64,
+    field_of_view: FieldOfView,
 }
 
 impl KannalaBrandt {
@@ -27,33 +26,27 @@ impl KannalaBrandt {
     pub fn new(k: [f64; 4]) -> Self {
         let mut lens = Self {
             k,
-            max_angle_rad: PI,
-            limit_rad: PI,
+            field_of_view: FieldOfView::up_to(PI),
         };
-        lens.limit_rad = monotone_limit(|theta| lens.radius(theta).1, PI).min(PI);
+        let limit_rad = monotone_limit(|theta| lens.radius(theta).1, PI).min(PI);
+        lens.field_of_view = FieldOfView::up_to(limit_rad);
         lens
     }
 
     /// This lens, limited to `max_angle_rad` off its axis.
     pub fn limited_to(mut self, max_angle_rad: f64) -> Self {
-        self.max_angle_rad = max_angle_rad.min(PI);
-        self.limit_rad = self.limit_rad.min(self.max_angle_rad);
+        self.field_of_view = self.field_of_view.limited_to(max_angle_rad);
         self
     }
 
-    /// The largest angle off the axis to be used, radians; 180° if there is no limit.
-    pub fn max_angle_rad(&self) -> f64 {
-        self.max_angle_rad
+    /// The directions that it shows.
+    pub fn field_of_view(&self) -> &FieldOfView {
+        &self.field_of_view
     }
 
     /// The coefficients k1 to k4.
     pub fn coefficients(&self) -> &[f64; 4] {
         &self.k
-    }
-
-    /// The limit of the field of view: the largest angle off the axis, radians.
-    pub fn limit_rad(&self) -> f64 {
-        self.limit_rad
     }
 
     /// The radius θ_d and its derivative at the angle θ.
@@ -67,7 +60,9 @@ impl KannalaBrandt {
 
     /// Projects a point; None beyond the limit.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
-        project_radial(x_c, self.limit_rad, 1.0, |theta| self.radius(theta).0)
+        project_radial(x_c, self.field_of_view.limit_rad(), 1.0, |theta| {
+            self.radius(theta).0
+        })
     }
 
     /// `∂p_d/∂x_c` ([`radial_jacobian`]).
@@ -88,7 +83,11 @@ impl KannalaBrandt {
 
     /// Back-projects `p_d` to a unit vector; None beyond the limit.
     pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
-        let theta = invert_monotone(|theta| self.radius(theta), p_d.norm(), self.limit_rad)?;
+        let theta = invert_monotone(
+            |theta| self.radius(theta),
+            p_d.norm(),
+            self.field_of_view.limit_rad(),
+        )?;
         Some(radial_ray(p_d, theta))
     }
 }
@@ -113,7 +112,7 @@ mod tests {
             which in 0usize..4, share in 0.0f64..0.99, turn in -3.0f64..3.0, far in 0.1f64..30.0,
         ) {
             let lens = lenses()[which];
-            let (sin, cos) = (lens.limit_rad() * share).sin_cos();
+            let (sin, cos) = (lens.field_of_view().limit_rad() * share).sin_cos();
             let ray = Vector3::new(sin * turn.cos(), sin * turn.sin(), cos);
             let back = lens.project(&(ray * far)).and_then(|p_d| lens.ray(&p_d));
             prop_assert!(back.is_some_and(|back| (back - ray).norm() < 1e-9), "{lens:?}: {ray} \
@@ -152,8 +151,8 @@ mod tests {
     fn the_limit_is_where_the_radius_stops_rising() {
         // θ − 0.12 θ³ rises up to 1/√0.36.
         let lens = lenses()[3];
-        assert!((lens.limit_rad() - 1.0 / 0.6).abs() < 1e-12);
-        assert_eq!(lenses()[0].limit_rad(), PI);
+        assert!((lens.field_of_view().limit_rad() - 1.0 / 0.6).abs() < 1e-12);
+        assert_eq!(lenses()[0].field_of_view().limit_rad(), PI);
         let beyond = Vector3::new(1.7f64.sin(), 0.0, 1.7f64.cos());
         assert!(lens.project(&beyond).is_none());
         assert!(lenses()[0].project(&beyond).is_some(), "behind the camera");

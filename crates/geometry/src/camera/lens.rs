@@ -70,12 +70,12 @@ impl Lens {
         let (angle, all) = match self {
             Self::BrownConrady(lens) => (lens.max_angle_rad(), FRAC_PI_2),
             Self::Fov(lens) => (lens.max_angle_rad(), FRAC_PI_2),
-            Self::KannalaBrandt(lens) => (lens.max_angle_rad(), PI),
-            Self::Mei(lens) => (lens.max_angle_rad(), PI),
-            Self::DoubleSphere(lens) => (lens.max_angle_rad(), PI),
-            Self::Eucm(lens) => (lens.max_angle_rad(), PI),
-            Self::ThinPrismFisheye(lens) => (lens.max_angle_rad(), PI),
-            Self::Ocam(lens) => (lens.max_angle_rad(), PI),
+            Self::KannalaBrandt(lens) => (lens.field_of_view().max_angle_rad(), PI),
+            Self::Mei(lens) => (lens.field_of_view().max_angle_rad(), PI),
+            Self::DoubleSphere(lens) => (lens.field_of_view().max_angle_rad(), PI),
+            Self::Eucm(lens) => (lens.field_of_view().max_angle_rad(), PI),
+            Self::ThinPrismFisheye(lens) => (lens.field_of_view().max_angle_rad(), PI),
+            Self::Ocam(lens) => (lens.field_of_view().max_angle_rad(), PI),
         };
         (angle < all).then_some(angle)
     }
@@ -213,7 +213,9 @@ impl Lens {
             Self::KannalaBrandt(lens) => {
                 let mut k = *lens.coefficients();
                 [k[0], k[1]] = [k1, k2];
-                Self::KannalaBrandt(KannalaBrandt::new(k).limited_to(lens.max_angle_rad()))
+                Self::KannalaBrandt(
+                    KannalaBrandt::new(k).limited_to(lens.field_of_view().max_angle_rad()),
+                )
             }
             Self::Mei(lens) => Self::Mei(lens.with_k([k1, k2])),
             Self::ThinPrismFisheye(lens) => Self::ThinPrismFisheye(lens.with_k1_k2(k1, k2)),

@@ -89,13 +89,13 @@ const LENSES: usize = 26;
 pub fn limit_rad(lens: &Lens) -> f64 {
     match lens {
         Lens::BrownConrady(lens) => lens.limit().sqrt().atan(),
-        Lens::KannalaBrandt(lens) => lens.limit_rad(),
-        Lens::Mei(lens) => lens.limit_rad(),
-        Lens::DoubleSphere(lens) => lens.limit_rad(),
-        Lens::Eucm(lens) => lens.limit_rad(),
+        Lens::KannalaBrandt(lens) => lens.field_of_view().limit_rad(),
+        Lens::Mei(lens) => lens.field_of_view().limit_rad(),
+        Lens::DoubleSphere(lens) => lens.field_of_view().limit_rad(),
+        Lens::Eucm(lens) => lens.field_of_view().limit_rad(),
         Lens::Fov(lens) => lens.max_angle_rad(),
-        Lens::ThinPrismFisheye(lens) => lens.limit_rad(),
-        Lens::Ocam(lens) => lens.limit_rad(),
+        Lens::ThinPrismFisheye(lens) => lens.field_of_view().limit_rad(),
+        Lens::Ocam(lens) => lens.field_of_view().limit_rad(),
     }
 }
 

@@ -1,10 +1,10 @@
 //! The unified model of Mei and Rives, for omnidirectional cameras.
 
 use super::brown_conrady::{BrownCoefficients, BrownConrady};
+use super::field_of_view::FieldOfView;
 use super::lens_error::LensParameterError;
 use super::quotient::quotient_jacobian;
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
-use std::f64::consts::PI;
 
 /// Projection through a unit sphere with radial and tangential distortion:
 /// `p = (x, y)/(z + ξ |x_c|)` is distorted as by [`BrownConrady`] with k1, k2, p1, p2.
@@ -19,11 +19,7 @@ use std::f64::consts::PI;
 pub struct Mei {
     xi: f64,
     distortion: BrownConrady,
-    /// Largest angle off the axis to be used, radians.
-    max_angle_rad: f64,
-    limit_rad: f64,
-    /// Cosine of `limit_rad`.
-    min_cos: f64,
+    field_of_view: FieldOfView,
 }
 
 impl Mei {
@@ -52,28 +48,19 @@ impl Mei {
         Self {
             xi,
             distortion,
-            max_angle_rad: PI,
-            limit_rad: min_cos.acos(),
-            min_cos,
+            field_of_view: FieldOfView::down_to(min_cos),
         }
     }
 
     /// This lens, limited to `max_angle_rad` off its axis.
     pub fn limited_to(mut self, max_angle_rad: f64) -> Self {
-        self.max_angle_rad = max_angle_rad.min(PI);
-        self.limit_rad = self.limit_rad.min(self.max_angle_rad);
-        self.min_cos = self.min_cos.max(self.max_angle_rad.cos());
+        self.field_of_view = self.field_of_view.limited_to(max_angle_rad);
         self
     }
 
-    /// The largest angle off the axis to be used, radians; 180° if there is no limit.
-    pub fn max_angle_rad(&self) -> f64 {
-        self.max_angle_rad
-    }
-
-    /// The limit of the field of view: the largest angle off the axis, radians.
-    pub fn limit_rad(&self) -> f64 {
-        self.limit_rad
+    /// The directions that it shows.
+    pub fn field_of_view(&self) -> &FieldOfView {
+        &self.field_of_view
     }
 
     /// ξ.
@@ -99,7 +86,7 @@ impl Mei {
 
     /// This lens with k1 and k2 replaced.
     pub fn with_k(&self, k: [f64; 2]) -> Self {
-        Self::with_distortion(self.xi, k, self.p()).limited_to(self.max_angle_rad)
+        Self::with_distortion(self.xi, k, self.p()).limited_to(self.field_of_view.max_angle_rad())
     }
 
     /// Distance of a point at a small angle from the image's centre, per radian: `1/(1 + ξ)`.
@@ -109,7 +96,7 @@ impl Mei {
 
     /// Projects a point; None beyond the limit.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
-        let is_shown = x_c.z > self.min_cos * x_c.norm();
+        let is_shown = self.field_of_view.shows(x_c);
         is_shown.then(|| self.distortion.distort(&self.undistorted(x_c)))
     }
 
@@ -136,7 +123,7 @@ impl Mei {
     /// Back-projects `p_d` to a unit vector; None beyond the limit.
     pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
         let p = self.distortion.undistort(p_d)?;
-        lifted(self.xi, &p).filter(|ray| ray.z > self.min_cos)
+        lifted(self.xi, &p).filter(|ray| self.field_of_view.shows_ray(ray))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The polynomial model of OCamCalib, for omnidirectional cameras.
 
+use super::field_of_view::FieldOfView;
 use super::lens_error::LensParameterError;
 use super::monotone::{invert_monotone, monotone_limit};
 use super::radial::{project_radial, radial_jacobian, radial_ray};
@@ -32,11 +33,9 @@ pub struct Ocam {
     polynomial: [f64; OCAM_COEFFICIENTS],
     /// c, d, e.
     affine: [f64; 3],
-    /// Largest angle off the axis to be used, radians.
-    max_angle_rad: f64,
+    field_of_view: FieldOfView,
     /// The radius ρ and the angle at which θ stops rising.
     end: (f64, f64),
-    limit_rad: f64,
 }
 
 impl Ocam {
@@ -56,9 +55,8 @@ impl Ocam {
         let mut lens = Self {
             polynomial,
             affine,
-            max_angle_rad: PI,
+            field_of_view: FieldOfView::up_to(PI),
             end: (0.0, 0.0),
-            limit_rad: PI,
         };
         let rises = |rho: f64| {
             let (g, slope) = lens.depth(rho);
@@ -66,25 +64,19 @@ impl Ocam {
         };
         let end = monotone_limit(rises, MAX_RADIUS).min(MAX_RADIUS);
         lens.end = (end, lens.angle(end).0);
-        lens.limit_rad = lens.end.1;
+        lens.field_of_view = FieldOfView::up_to(lens.end.1);
         Ok(lens)
     }
 
     /// This lens, limited to `max_angle_rad` off its axis.
     pub fn limited_to(mut self, max_angle_rad: f64) -> Self {
-        self.max_angle_rad = max_angle_rad.min(PI);
-        self.limit_rad = self.limit_rad.min(self.max_angle_rad);
+        self.field_of_view = self.field_of_view.limited_to(max_angle_rad);
         self
     }
 
-    /// The largest angle off the axis to be used, radians; 180° if there is no limit.
-    pub fn max_angle_rad(&self) -> f64 {
-        self.max_angle_rad
-    }
-
-    /// The limit of the field of view: the largest angle off the axis, radians.
-    pub fn limit_rad(&self) -> f64 {
-        self.limit_rad
+    /// The directions that it shows.
+    pub fn field_of_view(&self) -> &FieldOfView {
+        &self.field_of_view
     }
 
     /// The coefficients a2 to a9.
@@ -130,7 +122,9 @@ impl Ocam {
 
     /// Projects a point; None beyond the limit.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
-        let m = project_radial(x_c, self.limit_rad, 1.0, |theta| self.radius(theta).0)?;
+        let m = project_radial(x_c, self.field_of_view.limit_rad(), 1.0, |theta| {
+            self.radius(theta).0
+        })?;
         Some(self.shear() * m)
     }
 
@@ -144,6 +138,6 @@ impl Ocam {
         let m = self.shear().try_inverse()? * p_d;
         let rho = m.norm();
         let theta = self.angle(rho).0;
-        (rho < self.end.0 && theta < self.limit_rad).then(|| radial_ray(&m, theta))
+        (rho < self.end.0 && theta < self.field_of_view.limit_rad()).then(|| radial_ray(&m, theta))
     }
 }

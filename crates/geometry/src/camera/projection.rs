@@ -45,21 +45,33 @@ const MAX_SHARE_ITERATIONS: usize = 30;
 const SHARE_TOLERANCE: f64 = 1e-13;
 
 impl Camera {
+    /// A camera at rest that is given no range: its image's width and height, focal lengths and
+    /// principal point, all in pixels, and its lens.
+    pub fn at_rest(
+        [width, height]: [u32; 2],
+        [fx, fy]: [f64; 2],
+        [cx, cy]: [f64; 2],
+        lens: Lens,
+    ) -> Self {
+        Self {
+            width,
+            height,
+            fx,
+            fy,
+            cx,
+            cy,
+            lens,
+            sweep: Sweep::default(),
+            max_range_m: f64::INFINITY,
+        }
+    }
+
     /// A pinhole camera with square pixels and a central principal point, from its vertical field
     /// of view (radians): `f = (height / 2) / tan(fov / 2)`.
     pub fn from_vertical_fov(width: u32, height: u32, fov_rad: f64) -> Self {
         let f = 0.5 * f64::from(height) / (0.5 * fov_rad).tan();
-        Self {
-            width,
-            height,
-            fx: f,
-            fy: f,
-            cx: 0.5 * (f64::from(width) - 1.0),
-            cy: 0.5 * (f64::from(height) - 1.0),
-            lens: Lens::default(),
-            sweep: Sweep::default(),
-            max_range_m: f64::INFINITY,
-        }
+        let [cx, cy] = [width, height].map(|pixels| 0.5 * (f64::from(pixels) - 1.0));
+        Self::at_rest([width, height], [f, f], [cx, cy], Lens::default())
     }
 
     /// This camera with a rolling-shutter motion.
@@ -342,17 +354,12 @@ mod tests {
     use proptest::prelude::*;
 
     fn camera() -> Camera {
-        Camera {
-            width: 640,
-            height: 480,
-            fx: 415.0,
-            fy: 417.0,
-            cx: 318.0,
-            cy: 241.0,
-            lens: Lens::radial(-0.06, 0.01),
-            sweep: Sweep::default(),
-            max_range_m: f64::INFINITY,
-        }
+        Camera::at_rest(
+            [640, 480],
+            [415.0, 417.0],
+            [318.0, 241.0],
+            Lens::radial(-0.06, 0.01),
+        )
     }
 
     /// Cameras at rest and in motion.

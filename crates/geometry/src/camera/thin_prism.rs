@@ -1,5 +1,6 @@
 //! The Kannala–Brandt fisheye with tangential and thin-prism distortion.
 
+use super::field_of_view::FieldOfView;
 use super::lens_error::LensParameterError;
 use super::monotone::invert_monotone;
 use super::planar_inverse::{invert_planar, planar_limit};
@@ -33,9 +34,7 @@ pub struct ThinPrismCoefficients {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinPrismFisheye {
     coefficients: ThinPrismCoefficients,
-    /// Largest angle off the axis to be used, radians.
-    max_angle_rad: f64,
-    limit_rad: f64,
+    field_of_view: FieldOfView,
 }
 
 impl ThinPrismFisheye {
@@ -55,11 +54,11 @@ impl ThinPrismFisheye {
     fn with_coefficients(coefficients: ThinPrismCoefficients) -> Self {
         let mut lens = Self {
             coefficients,
-            max_angle_rad: PI,
-            limit_rad: PI,
+            field_of_view: FieldOfView::up_to(PI),
         };
         let determinant = |q: &Vector2<f64>| lens.distortion_jacobian(q).determinant();
-        lens.limit_rad = planar_limit(determinant, PI, lens.is_radial()).min(PI);
+        let limit_rad = planar_limit(determinant, PI, lens.is_radial()).min(PI);
+        lens.field_of_view = FieldOfView::up_to(limit_rad);
         lens
     }
 
@@ -70,19 +69,13 @@ impl ThinPrismFisheye {
 
     /// This lens, limited to `max_angle_rad` off its axis.
     pub fn limited_to(mut self, max_angle_rad: f64) -> Self {
-        self.max_angle_rad = max_angle_rad.min(PI);
-        self.limit_rad = self.limit_rad.min(self.max_angle_rad);
+        self.field_of_view = self.field_of_view.limited_to(max_angle_rad);
         self
     }
 
-    /// The largest angle off the axis to be used, radians; 180° if there is no limit.
-    pub fn max_angle_rad(&self) -> f64 {
-        self.max_angle_rad
-    }
-
-    /// The limit of the field of view: the largest angle off the axis, radians.
-    pub fn limit_rad(&self) -> f64 {
-        self.limit_rad
+    /// The directions that it shows.
+    pub fn field_of_view(&self) -> &FieldOfView {
+        &self.field_of_view
     }
 
     /// The coefficients.
@@ -94,7 +87,7 @@ impl ThinPrismFisheye {
     pub fn with_k1_k2(&self, k1: f64, k2: f64) -> Self {
         let mut coefficients = self.coefficients;
         [coefficients.k[0], coefficients.k[1]] = [k1, k2];
-        Self::with_coefficients(coefficients).limited_to(self.max_angle_rad)
+        Self::with_coefficients(coefficients).limited_to(self.field_of_view.max_angle_rad())
     }
 
     /// The radial factor f and its derivative by θ².
@@ -138,7 +131,8 @@ impl ThinPrismFisheye {
 
     /// Projects a point; None beyond the limit.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
-        project_radial(x_c, self.limit_rad, 1.0, |theta| theta).map(|q| self.distort(&q))
+        project_radial(x_c, self.field_of_view.limit_rad(), 1.0, |theta| theta)
+            .map(|q| self.distort(&q))
     }
 
     /// `∂p_d/∂x_c = ∂p_d/∂q ∂q/∂x_c`, the latter by [`radial_jacobian`].
@@ -168,16 +162,17 @@ impl ThinPrismFisheye {
             let (f, slope) = self.factor(square);
             (theta * f, f + 2.0 * square * slope)
         };
-        let theta = invert_monotone(radial, target, self.limit_rad);
+        let limit_rad = self.field_of_view.limit_rad();
+        let theta = invert_monotone(radial, target, limit_rad);
         if self.is_radial() {
             return theta.map(|theta| radial_ray(p_d, theta));
         }
         // Without a radial solution the other part may still allow one.
-        let start = theta.unwrap_or(0.9 * self.limit_rad.min(target));
+        let start = theta.unwrap_or(0.9 * limit_rad.min(target));
         let q = invert_planar(
             p_d,
-            p_d * (start.min(0.999 * self.limit_rad) / target),
-            self.limit_rad * self.limit_rad,
+            p_d * (start.min(0.999 * limit_rad) / target),
+            limit_rad * limit_rad,
             |q| self.distort(q),
             |q| self.distortion_jacobian(q),
         )?;

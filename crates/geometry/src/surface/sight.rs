@@ -75,12 +75,8 @@ pub fn viewing_distance(
     camera: &Camera,
     pose: &Pose,
 ) -> Result<f64, SurfaceError> {
-    match surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z())) {
-        Ok(hit) if hit.range <= MAX_VIEWING_DISTANCE_RADII * mean_radius_m(surface) => {
-            return Ok(hit.range);
-        }
-        Ok(_) | Err(SurfaceError::Parallel) => {}
-        Err(error) => return Err(error),
+    if let Some(distance_m) = distance_across(surface, pose)? {
+        return Ok(distance_m);
     }
     let rays = camera.border(RAYS_PER_EDGE, 0.0).into_iter();
     let ranges_m = rays
@@ -96,9 +92,17 @@ pub fn viewing_distance(
 
 /// True if a camera's optical axis meets no wall, or only where it looks along the tunnel.
 pub fn looks_along(surface: &dyn Surface, pose: &Pose) -> bool {
+    !matches!(distance_across(surface, pose), Ok(Some(_)))
+}
+
+/// Distance of the wall along a camera's optical axis, metres; None if the camera looks along the
+/// tunnel.
+fn distance_across(surface: &dyn Surface, pose: &Pose) -> Result<Option<f64>, SurfaceError> {
+    let farthest_m = MAX_VIEWING_DISTANCE_RADII * mean_radius_m(surface);
     match surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z())) {
-        Ok(hit) => hit.range > MAX_VIEWING_DISTANCE_RADII * mean_radius_m(surface),
-        Err(_) => true,
+        Ok(hit) => Ok(Some(hit.range).filter(|range_m| *range_m <= farthest_m)),
+        Err(SurfaceError::Parallel) => Ok(None),
+        Err(error) => Err(error),
     }
 }
 

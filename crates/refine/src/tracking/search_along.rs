@@ -10,7 +10,7 @@ use crate::thresholds::correlation_search::MAX_DEVIATION_SIGMA;
 use crate::tracking::search_grid::{
     SearchGrid, TURN_STEP_SAMPLES, Turns, all_turns, symmetric_steps,
 };
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use tunnelstitch_geometry::surface::mean_radius_m;
 use tunnelstitch_geometry::trajectory::{Pose, so3};
 
@@ -68,6 +68,12 @@ impl SearchAlong {
             reach_m: [reach(roll_sigma * radius_m), reach(along_sigma_m)],
         }
     }
+
+    /// The rotation by both tilts.
+    fn tilt(&self, turns: Turns) -> UnitQuaternion<f64> {
+        let [first, second] = self.tilt_axes;
+        so3::exp(&(first * turns[0] + second * turns[1]))
+    }
 }
 
 /// Step between tilts, radians, for wall of which the nearest is `distance_m` away and samples
@@ -86,19 +92,15 @@ impl SearchGrid for SearchAlong {
     }
 
     fn turned_pose(&self, turns: Turns) -> Pose {
-        let [first, second] = self.tilt_axes;
-        let turn = so3::exp(&(first * turns[0] + second * turns[1]));
-        Pose::new(self.predicted.r_wc * turn, self.predicted.t_wc)
+        Pose::new(self.predicted.r_wc * self.tilt(turns), self.predicted.t_wc)
     }
 
     fn shifted_pose(&self, turns: Turns, shift_m: &Vector2<f64>) -> Option<Pose> {
         let roll = so3::exp(&(self.tunnel_axis * (shift_m.x / self.radius_m)));
-        let turned = self.turned_pose(turns);
         let along_w = self.predicted.r_wc * self.tunnel_axis;
         // The roll is about the tunnel's axis, before the tilts.
-        let tilt = self.predicted.r_wc.inverse() * turned.r_wc;
         Some(Pose::new(
-            self.predicted.r_wc * roll * tilt,
+            self.predicted.r_wc * roll * self.tilt(turns),
             self.predicted.t_wc + along_w * shift_m.y,
         ))
     }

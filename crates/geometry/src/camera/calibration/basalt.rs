@@ -6,7 +6,6 @@ use super::selection::select_camera;
 use super::value_tree::{number, numbers, text_entry};
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
-use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
 /// True for a file with `value0` and cameras in it.
@@ -41,17 +40,12 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
     let intrinsics = camera.get("intrinsics");
     let intrinsics = intrinsics.ok_or_else(|| missing("intrinsics"))?;
     let at = |name: &str| number(intrinsics, &[name]);
-    Ok(Camera {
-        width,
-        height,
-        fx: at("fx")?,
-        fy: at("fy")?,
-        cx: at("cx")?,
-        cy: at("cy")?,
-        lens: lens(text_entry(camera, "camera_type").unwrap_or("?"), at)?,
-        sweep: Sweep::default(),
-        max_range_m: f64::INFINITY,
-    })
+    Ok(Camera::at_rest(
+        [width, height],
+        [at("fx")?, at("fy")?],
+        [at("cx")?, at("cy")?],
+        lens(text_entry(camera, "camera_type").unwrap_or("?"), at)?,
+    ))
 }
 
 /// The lens of a type of camera with the parameters `at` their names.

@@ -4,7 +4,6 @@ use super::coefficients::{brown_conrady, kannala_brandt, mei};
 use super::error::ParseError;
 use super::value_tree::{entry, number, pixels, text_entry};
 use crate::camera::projection::Camera;
-use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
 /// True for a file with `model_type`.
@@ -50,15 +49,13 @@ pub fn read(tree: &Value) -> Result<Camera, ParseError> {
         }
     };
     let [fx, fy, cx, cy] = names.map(|name| number(projection, &[name]));
-    Ok(Camera {
-        width: pixels(tree, &["image_width"])?,
-        height: pixels(tree, &["image_height"])?,
-        fx: fx?,
-        fy: fy?,
-        cx: cx?,
-        cy: cy?,
+    Ok(Camera::at_rest(
+        [
+            pixels(tree, &["image_width"])?,
+            pixels(tree, &["image_height"])?,
+        ],
+        [fx?, fy?],
+        [cx?, cy?],
         lens,
-        sweep: Sweep::default(),
-        max_range_m: f64::INFINITY,
-    })
+    ))
 }

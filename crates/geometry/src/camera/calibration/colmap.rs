@@ -5,7 +5,6 @@ use super::error::ParseError;
 use super::selection::select_camera;
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
-use crate::camera::sweep::Sweep;
 
 /// Creates a lens from its coefficients.
 type ReadLens = fn(&[f64]) -> Result<Lens, ParseError>;
@@ -94,15 +93,10 @@ fn camera(line: &str) -> Result<Camera, String> {
         [fx, fy, cx, cy] => [fx, fy, cx, cy],
         _ => return Err(fail(central + rest)),
     };
-    Ok(Camera {
-        width,
-        height,
-        fx,
-        fy,
-        cx: cx - 0.5,
-        cy: cy - 0.5,
-        lens: lens(&params[central..]).map_err(|error| error.what)?,
-        sweep: Sweep::default(),
-        max_range_m: f64::INFINITY,
-    })
+    Ok(Camera::at_rest(
+        [width, height],
+        [fx, fy],
+        [cx - 0.5, cy - 0.5],
+        lens(&params[central..]).map_err(|error| error.what)?,
+    ))
 }

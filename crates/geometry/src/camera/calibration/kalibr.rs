@@ -6,7 +6,6 @@ use super::selection::select_camera;
 use super::value_tree::{numbers, text_entry};
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
-use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
 /// True for a file with entries `cam0`, `cam1`, …
@@ -55,17 +54,12 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
             ));
         }
     };
-    Ok(Camera {
-        width,
-        height,
-        fx: *fx,
-        fy: *fy,
-        cx: *cx,
-        cy: *cy,
-        lens: lens(camera, model, own)?,
-        sweep: Sweep::default(),
-        max_range_m: f64::INFINITY,
-    })
+    Ok(Camera::at_rest(
+        [width, height],
+        [*fx, *fy],
+        [*cx, *cy],
+        lens(camera, model, own)?,
+    ))
 }
 
 fn list(camera: &Value, name: &str) -> Result<Vec<f64>, ParseError> {

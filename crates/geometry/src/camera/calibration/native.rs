@@ -3,7 +3,6 @@
 use super::error::ParseError;
 use super::lens_keys::{LensKeys, Model};
 use crate::camera::projection::Camera;
-use crate::camera::sweep::Sweep;
 use serde::{Deserialize, Serialize, Serializer};
 use serde_json::Value;
 
@@ -188,16 +187,11 @@ impl CameraFile {
             PixelCentre::Integer => 0.0,
             PixelCentre::Half => 0.5,
         };
-        Ok(Camera {
-            width: self.width,
-            height: self.height,
-            fx: self.fx,
-            fy: self.fy,
-            cx: self.cx - shift,
-            cy: self.cy - shift,
-            lens: lens.limited_to(max_angle_rad),
-            sweep: Sweep::default(),
-            max_range_m: f64::INFINITY,
-        })
+        Ok(Camera::at_rest(
+            [self.width, self.height],
+            [self.fx, self.fy],
+            [self.cx - shift, self.cy - shift],
+            lens.limited_to(max_angle_rad),
+        ))
     }
 }

@@ -6,7 +6,6 @@ use super::selection::select_camera;
 use super::value_tree::{number, pixels, text_entry};
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
-use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
 /// True for a file with `fl_x` or `frames`.
@@ -86,15 +85,13 @@ fn camera(own: &Value, tree: &Value) -> Result<Camera, ParseError> {
         }
     };
     let fx = number(own, &["fl_x"])?;
-    Ok(Camera {
-        width: pixels(own, &["w"])?,
-        height: pixels(own, &["h"])?,
-        fx,
-        fy: own.get("fl_y").map_or(Ok(fx), |_| number(own, &["fl_y"]))?,
-        cx: number(own, &["cx"])? - 0.5,
-        cy: number(own, &["cy"])? - 0.5,
+    Ok(Camera::at_rest(
+        [pixels(own, &["w"])?, pixels(own, &["h"])?],
+        [
+            fx,
+            own.get("fl_y").map_or(Ok(fx), |_| number(own, &["fl_y"]))?,
+        ],
+        [number(own, &["cx"])? - 0.5, number(own, &["cy"])? - 0.5],
         lens,
-        sweep: Sweep::default(),
-        max_range_m: f64::INFINITY,
-    })
+    ))
 }

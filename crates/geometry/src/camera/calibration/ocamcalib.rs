@@ -4,7 +4,6 @@ use super::error::ParseError;
 use crate::camera::lens::Lens;
 use crate::camera::ocam::{OCAM_COEFFICIENTS, Ocam};
 use crate::camera::projection::Camera;
-use crate::camera::sweep::Sweep;
 
 /// Lines of numbers: polynomial, inverse polynomial, centre, affine part, size.
 const LINES: usize = 5;
@@ -55,17 +54,12 @@ pub fn read(text: &str) -> Result<Camera, ParseError> {
     }
     let [height, width] = sides.map(|side| side as u32);
     let (focal_px, polynomial) = polynomial(direct)?;
-    Ok(Camera {
-        width,
-        height,
-        fx: focal_px,
-        fy: focal_px,
-        cx: column,
-        cy: row,
-        lens: Lens::Ocam(Ocam::new(polynomial, affine)?),
-        sweep: Sweep::default(),
-        max_range_m: f64::INFINITY,
-    })
+    Ok(Camera::at_rest(
+        [width, height],
+        [focal_px, focal_px],
+        [column, row],
+        Lens::Ocam(Ocam::new(polynomial, affine)?),
+    ))
 }
 
 /// The focal length and the polynomial in focal lengths.

@@ -6,7 +6,6 @@ use super::unknown::unknown_calibration;
 use super::value_tree::{entry, numbers, pixels, text_entry};
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
-use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
 const MATRIX: [&str; 6] = [
@@ -80,15 +79,5 @@ pub fn read(tree: &Value) -> Result<Camera, ParseError> {
             )));
         }
     };
-    Ok(Camera {
-        width,
-        height,
-        fx,
-        fy,
-        cx,
-        cy,
-        lens,
-        sweep: Sweep::default(),
-        max_range_m: f64::INFINITY,
-    })
+    Ok(Camera::at_rest([width, height], [fx, fy], [cx, cy], lens))
 }

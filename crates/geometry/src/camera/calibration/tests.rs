@@ -3,13 +3,17 @@ use crate::camera::brown_conrady::{BrownCoefficients, BrownConrady};
 use crate::camera::kannala_brandt::KannalaBrandt;
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
-use crate::camera::sweep::Sweep;
 
 fn read_as(name: &str, text: &str) -> Result<Camera, CalibrationError> {
     read_camera(name, text, None)
 }
 
-fn read_camera(name: &str, text: &str, camera: Option<&str>) -> Result<Camera, CalibrationError> {
+/// Reads a calibration file with this name and text, of which it is the `camera`.
+pub(super) fn read_camera(
+    name: &str,
+    text: &str,
+    camera: Option<&str>,
+) -> Result<Camera, CalibrationError> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(name);
     std::fs::write(&path, text).unwrap();
@@ -76,18 +80,9 @@ distortion_coefficients: !!opencv-matrix
 avg_reprojection_error: 1.2e-01
 ";
 
-fn calibrated(lens: Lens) -> Camera {
-    Camera {
-        width: 640,
-        height: 480,
-        fx: 415.0,
-        fy: 417.0,
-        cx: 318.0,
-        cy: 241.0,
-        lens,
-        sweep: Sweep::default(),
-        max_range_m: f64::INFINITY,
-    }
+/// The camera of the calibration files of the tests.
+pub(super) fn calibrated(lens: Lens) -> Camera {
+    Camera::at_rest([640, 480], [415.0, 417.0], [318.0, 241.0], lens)
 }
 
 #[test]

@@ -1,3 +1,4 @@
+use super::tests::{calibrated, read_camera};
 use super::*;
 use crate::camera::double_sphere::DoubleSphere;
 use crate::camera::eucm::Eucm;
@@ -7,30 +8,8 @@ use crate::camera::lens::Lens;
 use crate::camera::lens_tests::wide_angle_lenses;
 use crate::camera::mei::Mei;
 use crate::camera::projection::Camera;
-use crate::camera::sweep::Sweep;
 use crate::camera::thin_prism::{ThinPrismCoefficients, ThinPrismFisheye};
 use nalgebra::{Vector2, Vector3};
-
-fn read(name: &str, text: &str, camera: Option<&str>) -> Result<Camera, CalibrationError> {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join(name);
-    std::fs::write(&path, text).unwrap();
-    read_calibration(&path, camera)
-}
-
-fn with(lens: Lens) -> Camera {
-    Camera {
-        width: 640,
-        height: 480,
-        fx: 415.0,
-        fy: 417.0,
-        cx: 318.0,
-        cy: 241.0,
-        lens,
-        sweep: Sweep::default(),
-        max_range_m: f64::INFINITY,
-    }
-}
 
 #[test]
 fn our_own_file_restores_every_wide_angle_camera_exactly() {
@@ -39,17 +18,25 @@ fn our_own_file_restores_every_wide_angle_camera_exactly() {
         let camera = Camera {
             fx: 900.0,
             fy: 900.0,
-            ..with(*lens)
+            ..calibrated(*lens)
         };
         let text = format_calibration(&camera);
-        assert_eq!(read("camera.json", &text, None).unwrap(), camera, "{text}");
+        assert_eq!(
+            read_camera("camera.json", &text, None).unwrap(),
+            camera,
+            "{text}"
+        );
         assert!(
             text.contains(&format!("\"model\": {:?}", lens.name())),
             "{text}"
         );
         let tree: toml::Table = serde_json::from_str(&text).unwrap();
         let text = toml::to_string(&tree).unwrap();
-        assert_eq!(read("camera.toml", &text, None).unwrap(), camera, "{text}");
+        assert_eq!(
+            read_camera("camera.toml", &text, None).unwrap(),
+            camera,
+            "{text}"
+        );
     }
 }
 
@@ -152,7 +139,11 @@ fn files_of_other_programs_hold_the_same_lens() {
         ),
     ];
     for (name, text, lens) in files {
-        assert_eq!(read(name, &text, None).unwrap(), with(lens), "{text}");
+        assert_eq!(
+            read_camera(name, &text, None).unwrap(),
+            calibrated(lens),
+            "{text}"
+        );
     }
 }
 
@@ -169,7 +160,7 @@ const OCAM: &str = "#polynomial coefficients for the DIRECT mapping function\n\n
 /// 30 digits by mpmath.
 #[test]
 fn pixels_of_ocamcalib_are_those_of_its_direct_polynomial() {
-    let camera = read("calib_results.txt", OCAM, None).unwrap();
+    let camera = read_camera("calib_results.txt", OCAM, None).unwrap();
     assert_eq!((camera.width, camera.height), (640, 480));
     for (x_c, u, v) in [
         ([0.3, -0.2, 1.0], 381.04176861936475, 198.49743113792394),
@@ -187,13 +178,13 @@ fn one_of_several_cameras_of_basalt_is_chosen_by_its_number() {
     let text = basalt("pinhole", "")
         .replace("\"intrinsics\": [", "\"intrinsics\": [{}, ")
         .replace("[[640, 480]]", "[[1, 1], [640, 480]]");
-    let message = read("c.json", &text, None).unwrap_err().to_string();
+    let message = read_camera("c.json", &text, None).unwrap_err().to_string();
     assert!(
         message.contains("several cameras (cam0, cam1)"),
         "{message}"
     );
-    let camera = read("c.json", &text, Some("cam1")).unwrap();
-    assert_eq!(camera, with(Lens::default()));
+    let camera = read_camera("c.json", &text, Some("cam1")).unwrap();
+    assert_eq!(camera, calibrated(Lens::default()));
 }
 
 #[test]
@@ -282,7 +273,7 @@ fn files_that_hold_no_lens_say_why() {
         ("c.txt", OCAM.replace("480 640", "480 640.5"), "in pixels"),
     ];
     for (name, text, expected) in files {
-        let message = read(name, &text, None).unwrap_err().to_string();
+        let message = read_camera(name, &text, None).unwrap_err().to_string();
         assert!(message.contains(expected), "{text}: {message}");
     }
 }

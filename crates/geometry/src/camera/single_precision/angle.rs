@@ -95,7 +95,7 @@ pub struct ThinPrismFisheyeF32 {
 impl ThinPrismFisheyeF32 {
     pub(super) fn new(lens: &ThinPrismFisheye) -> Self {
         let ThinPrismCoefficients { k, p, s } = *lens.coefficients();
-        let limit_rad = lens.limit_rad();
+        let limit_rad = lens.field_of_view().limit_rad();
         Self {
             k: k.map(|k| k as f32),
             p: p.map(|p| p as f32),

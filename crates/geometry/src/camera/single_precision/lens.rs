@@ -58,7 +58,7 @@ impl LensF32 {
             Lens::BrownConrady(lens) => Self::BrownConrady(BrownConradyF32::new(lens)),
             Lens::KannalaBrandt(lens) => Self::KannalaBrandt(KannalaBrandtF32::new(
                 |theta| lens.radius(theta).0,
-                lens.limit_rad(),
+                lens.field_of_view().limit_rad(),
             )),
             Lens::Mei(lens) => Self::WideAngle(WideAngleF32::Mei(MeiF32::new(lens))),
             Lens::DoubleSphere(lens) => {

@@ -31,7 +31,7 @@ pub struct OcamF32 {
 
 impl OcamF32 {
     pub(super) fn new(lens: &Ocam) -> Self {
-        let min_cos = lens.limit_rad().min(MAX_ANGLE_RAD).cos();
+        let min_cos = lens.field_of_view().limit_rad().min(MAX_ANGLE_RAD).cos();
         let (middle, half) = (0.5 * (1.0 + min_cos), 0.5 * (1.0 - min_cos));
         let h = interpolate(|t| {
             let cos = (middle + half * t).min(1.0);

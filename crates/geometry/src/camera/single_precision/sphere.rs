@@ -22,7 +22,7 @@ impl MeiF32 {
         Self {
             xi: lens.xi() as f32,
             distortion: BrownConradyF32::new(lens.distortion()),
-            min_cos: lens.limit_rad().cos() as f32,
+            min_cos: lens.field_of_view().limit_rad().cos() as f32,
         }
     }
 }
@@ -51,7 +51,7 @@ impl DoubleSphereF32 {
         Self {
             xi: xi as f32,
             alpha: alpha as f32,
-            min_cos: lens.limit_rad().cos() as f32,
+            min_cos: lens.field_of_view().limit_rad().cos() as f32,
         }
     }
 }
@@ -83,7 +83,7 @@ impl EucmF32 {
         Self {
             alpha: alpha as f32,
             beta: beta as f32,
-            min_cos: lens.limit_rad().cos() as f32,
+            min_cos: lens.field_of_view().limit_rad().cos() as f32,
         }
     }
 }
