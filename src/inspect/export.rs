@@ -6,7 +6,7 @@ use super::layers::{PosedLayer, TextureOptions, draw_layers, lay_out_texture};
 use super::marks::{MARKS_CSV, MARKS_GEOJSON};
 use super::tiles_target::TilesFolder;
 use super::viewer::Viewer;
-use crate::persist::atomic::{StagedFolder, WriteError};
+use crate::persist::atomic::{OutputSet, StagedFolder, WriteError};
 use crate::progress::Progress;
 use crate::render::{Canvas, Target};
 use crate::survey::Survey;
@@ -59,12 +59,14 @@ pub fn export_wall(
     let settled = stitch.settle(&budget, progress)?;
     let (plan, frames) = stitch.plan(settled);
     plan.draw(frames, budget.room, &mut targets, progress)?;
+    let mut outputs = OutputSet::default();
     if let Some(single) = single {
-        single.finish()?;
+        single.finish(&mut outputs)?;
     }
     if let Some(tiles) = tiles {
-        tiles.finish(&canvas)?;
+        tiles.finish(&mut outputs, &canvas)?;
     }
+    outputs.commit()?;
     Ok(canvas)
 }
 

@@ -3,7 +3,7 @@
 use crate::inspect::block_cutter::{BlockCutter, build_part};
 use crate::inspect::error::InspectError;
 use crate::inspect::glb::{WallPart, encode_glb};
-use crate::persist::atomic::{self, WriteError};
+use crate::persist::atomic::{OutputSet, WriteError};
 use crate::raster::{RasterError, TILE_EDGE_PX};
 use crate::render::{Band, Canvas, PixelFormat, RenderError, Target};
 use crate::surface::Surface;
@@ -54,11 +54,11 @@ impl<'a> GlbTarget<'a> {
         self.cutter.max_bytes()
     }
 
-    /// Writes the file.
+    /// Writes the file and adds it to a set of outputs.
     ///
     /// # Errors
     /// [`InspectError::TooLong`]; [`InspectError::Write`].
-    pub fn finish(self) -> Result<(), InspectError> {
+    pub fn finish(self, outputs: &mut OutputSet) -> Result<(), InspectError> {
         if self.bytes > MAX_FILE_BYTES {
             return Err(InspectError::TooLong {
                 path: self.path,
@@ -67,8 +67,7 @@ impl<'a> GlbTarget<'a> {
             });
         }
         let file = encode_glb(&self.parts);
-        atomic::write(&self.path, |writer| writer.write_all(&file))?;
-        Ok(())
+        Ok(outputs.write(&self.path, |writer| writer.write_all(&file))?)
     }
 }
 

@@ -8,7 +8,7 @@ use crate::files::limits::MAX_MARKS_BYTES;
 use crate::files::read_text;
 use crate::inspect::error::InspectError;
 use crate::inspect::mark::{Mark, MarkVersions};
-use crate::persist::atomic;
+use crate::persist::atomic::OutputSet;
 use crate::trajectory::csv::to_cell;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -145,19 +145,12 @@ impl Marks {
         Ok(())
     }
 
-    /// Writes both files. The GeoJSON file, which is read again, is the last: if the table cannot
-    /// be written, it is unchanged.
+    /// Writes both files, or neither.
     fn write(&self, content: &Collection) -> Result<(), InspectError> {
-        let (geojson, csv) = (self.encode(content)?, self.csv(content)?);
-        atomic::write_text(&self.folder.join(MARKS_CSV), &csv)?;
-        let written = atomic::write_text(&self.folder.join(MARKS_GEOJSON), &geojson);
-        if written.is_err() {
-            // The table goes back to what the other file has. The first failure is reported.
-            if let Ok(before) = self.csv(&self.content) {
-                let _ = atomic::write_text(&self.folder.join(MARKS_CSV), &before);
-            }
-        }
-        Ok(written?)
+        let mut outputs = OutputSet::default();
+        outputs.write_text(&self.folder.join(MARKS_CSV), &self.csv(content)?)?;
+        outputs.write_text(&self.folder.join(MARKS_GEOJSON), &self.encode(content)?)?;
+        Ok(outputs.commit()?)
     }
 
     /// Encodes the marks as CSV, in order of chainage.

@@ -6,7 +6,7 @@ use crate::inspect::glb::{WallPart, encode_glb};
 use crate::inspect::level_strip::TextureBlock;
 use crate::inspect::manifest::{MAP_FOLDER, MapImages};
 use crate::inspect::tileset::{TileKey, TileTree, content_name};
-use crate::persist::atomic::{self, StagedFolder, WriteError};
+use crate::persist::atomic::{self, OutputSet, StagedFolder, WriteError};
 use crate::raster::RasterError;
 use crate::render::{Band, Canvas, PixelFormat, RenderError, Target};
 use crate::surface::Surface;
@@ -182,12 +182,12 @@ impl<'a> TilesFolder<'a> {
         &mut self.target
     }
 
-    /// Writes the tree of tiles and gives the folder its final name.
+    /// Writes the tree of tiles and adds the folder to a set of outputs.
     ///
     /// # Errors
     /// [`InspectError::Write`].
-    pub fn finish(self, canvas: &Canvas) -> Result<(), InspectError> {
+    pub fn finish(self, outputs: &mut OutputSet, canvas: &Canvas) -> Result<(), InspectError> {
         self.target.finish(canvas)?;
-        Ok(self.staged.finish()?)
+        Ok(outputs.folder(self.staged)?)
     }
 }

@@ -5,8 +5,8 @@ use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::evaluate::{ComparedPanoramas, Comparison, compare_survey, draw_before_after};
 use crate::files::printed;
-use crate::frames::{PictureFormat, write_picture};
-use crate::persist::atomic;
+use crate::frames::{PictureFormat, add_picture};
+use crate::persist::atomic::{self, OutputSet};
 use crate::progress::Progress;
 use crate::render::Layout;
 use crate::survey::Survey;
@@ -88,7 +88,7 @@ pub fn run(
         arguments.picture.interpolation.into(),
         terminal,
     )?;
-    let json = write_comparison(
+    let (json, mut outputs) = stage_comparison(
         &survey,
         &arguments.refined,
         arguments.picture.canvas.layout.into(),
@@ -98,7 +98,8 @@ pub fn run(
         terminal,
     )?;
     let inputs = record::hash_survey(&survey, [arguments.refined.as_path()])?;
-    record.write(&arguments.out.join(RUN_FILE), &inputs)?;
+    record.add_to(&mut outputs, &arguments.out.join(RUN_FILE), &inputs)?;
+    outputs.commit()?;
     if arguments.json {
         json::print_text(&json)?;
     } else {
@@ -108,11 +109,12 @@ pub fn run(
     check_quality(&comparison, arguments.max_wall_px)
 }
 
-/// Writes the panoramas and compare.json into `out`; returns the text of compare.json.
+/// Writes the panoramas and compare.json for `out`; returns the text of compare.json and the files,
+/// which have not their names yet.
 ///
 /// # Errors
 /// An output that cannot be written.
-pub fn write_comparison(
+pub fn stage_comparison(
     survey: &Survey,
     refined_file: &Path,
     layout: Layout,
@@ -120,7 +122,7 @@ pub fn write_comparison(
     drawings: ComparedPanoramas,
     out: &Path,
     terminal: &Terminal,
-) -> Result<String, Failure> {
+) -> Result<(String, OutputSet), Failure> {
     let json = json::text(&ComparisonReport {
         program: PROGRAM,
         survey: &survey.folder,
@@ -129,8 +131,9 @@ pub fn write_comparison(
         comparison,
     })?;
     terminal.start("writing", 4);
-    let write = |name: &str, image: &DynamicImage| -> Result<(), Failure> {
-        write_picture(&out.join(name), image, PictureFormat::Png)?;
+    let mut outputs = OutputSet::default();
+    let mut write = |name: &str, image: &DynamicImage| -> Result<(), Failure> {
+        add_picture(&mut outputs, &out.join(name), image, PictureFormat::Png)?;
         terminal.advance(1);
         Ok(())
     };
@@ -145,11 +148,11 @@ pub fn write_comparison(
     match drawings.truth {
         Some(truth) => write("truth.png", &truth.panorama.into_image(layout))?,
         // A picture of an earlier comparison would show other poses.
-        None => atomic::remove_file(&out.join("truth.png"))?,
+        None => outputs.remove(&out.join("truth.png"))?,
     }
     terminal.finish();
-    atomic::write_text(&out.join("compare.json"), &json)?;
-    Ok(json)
+    outputs.write_text(&out.join("compare.json"), &json)?;
+    Ok((json, outputs))
 }
 
 /// Fails if the error of the refined poses on the wall is above the limit.

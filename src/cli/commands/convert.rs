@@ -7,7 +7,7 @@ use crate::cli::output::{
     survey_files,
 };
 use crate::files::printed;
-use crate::persist::atomic::{self, StagedFolder, WriteError};
+use crate::persist::atomic::{self, OutputSet, StagedFolder, WriteError};
 use crate::trajectory::{StampedPose, colmap, csv, kitti, nerfstudio, tum};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
@@ -104,8 +104,10 @@ pub fn run(
         }
     };
     create_parent_folder(out)?;
-    atomic::write_text(out, &text)?;
-    record.write(&record::path_beside(out), &inputs)?;
+    let mut outputs = OutputSet::default();
+    outputs.write_text(out, &text)?;
+    record.add_to(&mut outputs, &record::path_beside(out), &inputs)?;
+    outputs.commit()?;
     terminal.say(format!(
         "wrote {} poses to {}",
         trajectory.len(),

@@ -1,10 +1,10 @@
 //! `tunnelstitch demo`: runs all steps on a simulated survey.
 
-use super::compare::write_comparison;
+use super::compare::stage_comparison;
 use super::overlay::leave_out_overlay;
 use super::refine::print_summary;
-use super::refine_files::refine_into;
-use super::report::report_into;
+use super::refine_files::stage_refined;
+use super::report::stage_report;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::{Comparison, compare_survey};
 use crate::files::printed;
@@ -97,7 +97,9 @@ pub fn run(
     let overlay = leave_out_overlay(&mut survey, arguments.json, terminal)?;
     let options = RefineOptions::default();
     let out = &folders.refined;
-    let (refined, _) = refine_into(&survey, &overlay, &options, out, record, None, terminal)?;
+    let (refined, _, outputs) =
+        stage_refined(&survey, &overlay, &options, out, record, None, terminal)?;
+    outputs.commit()?;
     if !arguments.json {
         print_summary(&refined, terminal);
     }
@@ -151,8 +153,9 @@ fn compare_and_report(
         drawings: &drawings,
         command: record.arguments.clone(),
     };
-    report_into(sources, &folders.report, terminal)?;
-    let json = write_comparison(
+    let (_, _, report) = stage_report(sources, &folders.report, terminal)?;
+    report.commit()?;
+    let (json, outputs) = stage_comparison(
         survey,
         &poses,
         Layout::default(),
@@ -161,5 +164,6 @@ fn compare_and_report(
         &folders.compared,
         terminal,
     )?;
+    outputs.commit()?;
     Ok((comparison, json))
 }

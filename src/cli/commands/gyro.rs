@@ -7,7 +7,7 @@ use crate::cli::output::{
     Failure, RunRecord, Suggestion, SuggestionArguments, Terminal, create_parent_folder, record,
 };
 use crate::files::printed;
-use crate::persist::atomic;
+use crate::persist::atomic::OutputSet;
 use crate::survey::PriorSection;
 use crate::trajectory::gyro::{
     ClockOffset, FrameStations, GyroBaseline, GyroLog, GyroOptions, InitialAttitude, Orientation,
@@ -243,13 +243,15 @@ pub fn run(
         );
     }
     create_parent_folder(&arguments.out)?;
-    atomic::write_text(&arguments.out, &tum::format(&baseline.trajectory))?;
+    let mut outputs = OutputSet::default();
+    outputs.write_text(&arguments.out, &tum::format(&baseline.trajectory))?;
     let inputs = arguments.times.files(arguments.survey.as_deref());
     let motion = arguments.motion.file();
     let others = motion.into_iter().chain(&sensor.body_to_camera);
     let inputs = inputs.iter().chain(others).chain([&arguments.log]);
     let inputs = record::hash_files(inputs.map(AsRef::as_ref))?;
-    record.write(&record::path_beside(&arguments.out), &inputs)?;
+    record.add_to(&mut outputs, &record::path_beside(&arguments.out), &inputs)?;
+    outputs.commit()?;
     print_summary(arguments, &log, &baseline, terminal);
     suggest_prior(arguments, &log, &baseline, terminal)
 }

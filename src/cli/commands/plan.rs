@@ -7,7 +7,7 @@ use crate::cli::output::{
     Failure, RunRecord, Suggestion, SuggestionArguments, Terminal, create_parent_folder, record,
 };
 use crate::files::printed;
-use crate::persist::atomic;
+use crate::persist::atomic::OutputSet;
 use crate::survey::PriorSection;
 use crate::trajectory::{Rate, StampedPose, Trajectory, tum};
 use std::path::PathBuf;
@@ -112,11 +112,13 @@ pub fn run(
         })
         .collect();
     create_parent_folder(&arguments.out)?;
-    atomic::write_text(&arguments.out, &tum::format(&trajectory))?;
+    let mut outputs = OutputSet::default();
+    outputs.write_text(&arguments.out, &tum::format(&trajectory))?;
     let inputs = arguments.times.files(arguments.survey.as_deref());
     let inputs = inputs.iter().chain(arguments.motion.file());
     let inputs = record::hash_files(inputs.map(AsRef::as_ref))?;
-    record.write(&record::path_beside(&arguments.out), &inputs)?;
+    record.add_to(&mut outputs, &record::path_beside(&arguments.out), &inputs)?;
+    outputs.commit()?;
     if let (Some(first), Some(last)) = (stations.first(), stations.last()) {
         terminal.say(format!(
             "wrote {} poses to {}: chainage {:.3} to {:.3} m, angle {:.2} to {:.2}°",

@@ -4,7 +4,8 @@ use crate::camera::{Camera, read_calibration};
 use crate::cli::arguments::{InterpolationArgument, positive};
 use crate::cli::output::{Failure, RunRecord, Terminal, picture_format, record};
 use crate::files::printed;
-use crate::frames::{FrameFile, load_colour, open_picture, write_picture};
+use crate::frames::{FrameFile, add_picture, load_colour, open_picture};
+use crate::persist::atomic::OutputSet;
 use crate::render::{Picture, cylinder};
 use image::ImageDecoder;
 use std::path::{Path, PathBuf};
@@ -68,10 +69,12 @@ pub fn run(
     let file = FrameFile::picture(0, arguments.image.clone());
     let photo = Picture::from_decoded(load_colour(&file, camera.width, camera.height)?);
     let result = cylinder::project(&photo, &camera, arguments.interpolation.into());
-    write_picture(&arguments.out, &result.image, format)?;
+    let mut outputs = OutputSet::default();
+    add_picture(&mut outputs, &arguments.out, &result.image, format)?;
     let inputs = [&arguments.image].into_iter().chain(&arguments.camera);
     let inputs = record::hash_files(inputs.map(AsRef::as_ref))?;
-    record.write(&record::path_beside(&arguments.out), &inputs)?;
+    record.add_to(&mut outputs, &record::path_beside(&arguments.out), &inputs)?;
+    outputs.commit()?;
     terminal.say(format!(
         "{}: {} × {} px, first pixel at û = {}, v̂ = {}",
         printed(&arguments.out),

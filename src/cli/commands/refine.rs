@@ -2,7 +2,7 @@
 
 use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
 use crate::cli::commands::overlay::leave_out_overlay;
-use crate::cli::commands::refine_files::refine_into;
+use crate::cli::commands::refine_files::stage_refined;
 use crate::cli::commands::refine_memory::check_memory;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::files::printed;
@@ -201,7 +201,7 @@ pub fn run(
     let (refined, json) = arguments.resume.run(&result, &origin, say, |checkpoint| {
         // After the check that the run to be continued is of the same frames.
         let overlay = leave_out_overlay(&mut survey, arguments.json, terminal)?;
-        let done = refine_into(
+        let (refined, json, mut outputs) = stage_refined(
             &survey,
             &overlay,
             &options,
@@ -210,8 +210,9 @@ pub fn run(
             Some(checkpoint),
             terminal,
         )?;
-        record.write(&arguments.out.join(RUN_FILE), &inputs)?;
-        Ok(done)
+        record.add_to(&mut outputs, &arguments.out.join(RUN_FILE), &inputs)?;
+        outputs.commit()?;
+        Ok((refined, json))
     })?;
     if 2 * refined.report.frames_on_prior > survey.frames.len() {
         warn_of_pose_convention(&survey, terminal)?;

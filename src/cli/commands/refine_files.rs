@@ -6,8 +6,8 @@ use crate::evaluate::deformation::{
     ShapeEstimate, deviation_sigmas_m, measure_sections, sections_csv,
 };
 use crate::files::printed;
-use crate::frames::{PictureFormat, write_picture};
-use crate::persist::atomic;
+use crate::frames::{PictureFormat, add_picture};
+use crate::persist::atomic::{self, OutputSet};
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::{
@@ -50,13 +50,13 @@ struct RefineFile<'a> {
 }
 
 /// Refines a survey, continuing from a checkpoint if there is one, and writes poses.tum,
-/// refine.json and covariance.csv into `out`, shape.json and sections.csv if the wall is deformed,
+/// refine.json and covariance.csv for `out`, shape.json and sections.csv if the wall is deformed,
 /// overlay.png if `overlay` has a mask.
-/// Also returns the text of refine.json.
+/// Also returns the text of refine.json and the files, which have not their names yet.
 ///
 /// # Errors
 /// Bad input, or an output that cannot be written.
-pub fn refine_into(
+pub fn stage_refined(
     survey: &Survey,
     overlay: &Overlay,
     options: &RefineOptions,
@@ -64,7 +64,7 @@ pub fn refine_into(
     record: &RunRecord,
     checkpoint: Option<&mut Checkpoint>,
     terminal: &Arc<Terminal>,
-) -> Result<(Refined, String), Failure> {
+) -> Result<(Refined, String, OutputSet), Failure> {
     atomic::create_folder(out)?;
     refuse_survey_folder(&survey.folder, out)?;
     let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
@@ -83,26 +83,29 @@ pub fn refine_into(
         overlay: &overlay.report,
         report: &refined.report,
     })?;
-    atomic::write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
-    atomic::write_text(&out.join(REFINEMENT_FILE), &json)?;
+    let mut outputs = OutputSet::default();
+    outputs.write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
+    outputs.write_text(&out.join(REFINEMENT_FILE), &json)?;
     let sigmas: Vec<_> = refined
         .report
         .frames
         .iter()
         .map(|frame| frame.sigma)
         .collect();
-    atomic::write_text(
-        &out.join("covariance.csv"),
-        &refined.covariances.csv(&sigmas),
-    )?;
-    write_masked_wall(refined.masked.as_ref(), out)?;
-    write_overlay(overlay, out)?;
-    write_survey(survey, &refined, out)?;
-    Ok((refined, json))
+    let covariances = refined.covariances.csv(&sigmas);
+    outputs.write_text(&out.join("covariance.csv"), &covariances)?;
+    add_masked_wall(&mut outputs, refined.masked.as_ref(), out)?;
+    add_overlay(&mut outputs, overlay, out)?;
+    add_survey(&mut outputs, survey, &refined, out)?;
+    Ok((refined, json, outputs))
 }
 
-/// Writes the wall where frames were left out; removes that of an earlier run.
-fn write_masked_wall(masked: Option<&MaskedWall>, out: &Path) -> Result<(), Failure> {
+/// Adds the wall where frames were left out; removes that of an earlier run.
+fn add_masked_wall(
+    outputs: &mut OutputSet,
+    masked: Option<&MaskedWall>,
+    out: &Path,
+) -> Result<(), Failure> {
     let path = out.join(MASKED_FILE);
     match masked {
         // On one line: indented, each number of its tables would have its own.
@@ -110,22 +113,23 @@ fn write_masked_wall(masked: Option<&MaskedWall>, out: &Path) -> Result<(), Fail
             let text = serde_json::to_string(masked).map_err(|error| {
                 Failure::bug(format!("cannot make JSON of {MASKED_FILE}: {error}"))
             })?;
-            Ok(atomic::write_text(&path, &(text + "\n"))?)
+            Ok(outputs.write_text(&path, &(text + "\n"))?)
         }
-        None => Ok(atomic::remove_file(&path)?),
+        None => Ok(outputs.remove(&path)?),
     }
 }
 
-/// Writes the mask of what does not move with the wall; removes that of an earlier run.
-fn write_overlay(overlay: &Overlay, out: &Path) -> Result<(), Failure> {
+/// Adds the mask of what does not move with the wall; removes that of an earlier run.
+fn add_overlay(outputs: &mut OutputSet, overlay: &Overlay, out: &Path) -> Result<(), Failure> {
     let path = out.join(OVERLAY_FILE);
     match &overlay.mask {
-        Some(mask) => Ok(write_picture(
+        Some(mask) => Ok(add_picture(
+            outputs,
             &path,
             &mask.picture().into(),
             PictureFormat::Png,
         )?),
-        None => Ok(atomic::remove_file(&path)?),
+        None => Ok(outputs.remove(&path)?),
     }
 }
 
@@ -140,13 +144,18 @@ fn refuse_survey_folder(survey: &Path, out: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Writes the calibration and the shape that were found, and a `survey.toml` that uses them with
-/// the survey's frames and initial poses; removes those of an earlier run.
-fn write_survey(survey: &Survey, refined: &Refined, out: &Path) -> Result<(), Failure> {
+/// Adds the calibration and the shape that were found, and a `survey.toml` that uses them with the
+/// survey's frames and initial poses; removes those of an earlier run.
+fn add_survey(
+    outputs: &mut OutputSet,
+    survey: &Survey,
+    refined: &Refined,
+    out: &Path,
+) -> Result<(), Failure> {
     let calibration = refined.report.calibration.as_ref();
-    let text_of = |file: &str, text: Option<String>| match text {
-        Some(text) => Ok(atomic::write_text(&out.join(file), &text)?),
-        None => Ok::<(), Failure>(atomic::remove_file(&out.join(file))?),
+    let mut text_of = |file: &str, text: Option<String>| match text {
+        Some(text) => outputs.write_text(&out.join(file), &text),
+        None => outputs.remove(&out.join(file)),
     };
     let camera = calibration.map(|calibration| format_calibration(&calibration.camera));
     text_of(CAMERA_FILE, camera)?;
@@ -170,7 +179,7 @@ fn write_survey(survey: &Survey, refined: &Refined, out: &Path) -> Result<(), Fa
     text_of(SECTIONS_FILE, sections)?;
     let text = toml::to_string(&file).map_err(|error| Failure::bug(error.to_string()))?;
     let text = format!("# The survey with the camera and the wall that refine has found.\n{text}");
-    Ok(atomic::write_text(&out.join(SURVEY_FILE), &text)?)
+    Ok(outputs.write_text(&out.join(SURVEY_FILE), &text)?)
 }
 
 /// Texts of shape.json and of sections.csv, for the tunnel of `file`.

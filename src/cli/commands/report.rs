@@ -5,7 +5,7 @@ use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::evaluate::compare_survey;
 use crate::files::printed;
-use crate::persist::atomic::{self, StagedFolder};
+use crate::persist::atomic::{self, OutputSet, StagedFolder};
 use crate::progress::Progress;
 use crate::render::Interpolation;
 use crate::report::{self, PICTURES, RefinedFiles, Report, Sources};
@@ -76,8 +76,9 @@ pub fn run(
         drawings,
         command: record.arguments.clone(),
     };
-    let (report, json) = report_into(sources, &arguments.out, terminal)?;
-    record.write(&arguments.out.join(RUN_FILE), &inputs)?;
+    let (report, json, mut outputs) = stage_report(sources, &arguments.out, terminal)?;
+    record.add_to(&mut outputs, &arguments.out.join(RUN_FILE), &inputs)?;
+    outputs.commit()?;
     if arguments.json {
         return json::print_text(&json);
     }
@@ -91,16 +92,16 @@ pub fn run(
     Ok(())
 }
 
-/// Writes report.html, report.json and report_pictures/ into `out`; returns the report and the text
-/// of report.json.
+/// Writes report.html, report.json and report_pictures/ for `out`; returns the report, the text of
+/// report.json and the files, which have not their names yet.
 ///
 /// # Errors
 /// A flagged frame that cannot be read, or an output that cannot be written.
-pub fn report_into(
+pub fn stage_report(
     sources: Sources,
     out: &Path,
     terminal: &Terminal,
-) -> Result<(Report, String), Failure> {
+) -> Result<(Report, String, OutputSet), Failure> {
     terminal.start("report", 1);
     let (report, pictures) = report::gather(sources)?;
     let page = report::page(&report, &pictures)?;
@@ -111,9 +112,10 @@ pub fn report_into(
         let path = folder.path().join(name);
         atomic::write(&path, |writer| writer.write_all(bytes))?;
     }
-    folder.finish()?;
-    atomic::write_text(&out.join("report.json"), &json)?;
-    atomic::write_text(&out.join("report.html"), &page)?;
+    let mut outputs = OutputSet::default();
+    outputs.folder(folder)?;
+    outputs.write_text(&out.join("report.json"), &json)?;
+    outputs.write_text(&out.join("report.html"), &page)?;
     terminal.finish();
-    Ok((report, json))
+    Ok((report, json, outputs))
 }

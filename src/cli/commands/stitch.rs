@@ -8,7 +8,9 @@ use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{Failure, RunRecord, Terminal, json, record};
 use crate::evaluate::deformation::DeviationMap;
 use crate::files::printed;
+use crate::persist::atomic::OutputSet;
 use crate::persist::checkpoint::Checkpoint;
+use crate::persist::provenance::Input;
 use crate::progress::Progress;
 use crate::refine::read_covariances;
 use crate::render::{
@@ -88,6 +90,8 @@ struct StitchRun<'a> {
     covariances: Option<Vec<Matrix6<f64>>>,
     deformation: Option<DeviationMap>,
     masked: Option<MaskedWall>,
+    record: &'a RunRecord,
+    inputs: Vec<Input>,
     terminal: &'a Terminal,
 }
 
@@ -117,6 +121,8 @@ pub fn run(
             None
         },
         masked: read_masked_wall(arguments, &survey)?,
+        record,
+        inputs: record::hash_survey(&survey, arguments.poses.file())?,
         terminal,
     };
     let mut stitch = Stitch::new(
@@ -131,8 +137,7 @@ pub fn run(
     let files = output.options();
     let budget = stitch.budget(files.pending_bytes(&canvas, format, run.layout))?;
     run.announce(&stitch, &budget);
-    let inputs = record::hash_survey(&survey, arguments.poses.file())?;
-    let origin = resume::origin(&survey, &run.options_of_result(), inputs.clone())?;
+    let origin = resume::origin(&survey, &run.options_of_result(), run.inputs.clone())?;
     let say = |text: &str| run.say(text);
     arguments
         .resume
@@ -141,8 +146,7 @@ pub fn run(
             for also in [&files.dzi, &files.maps].into_iter().flatten() {
                 checkpoint.lock_also(also)?;
             }
-            run.draw(&mut stitch, budget, checkpoint)?;
-            record.write(&output.run_file(), &inputs)
+            run.draw(&mut stitch, budget, checkpoint)
         })
 }
 
@@ -243,9 +247,13 @@ impl StitchRun<'_> {
             deformation: deformation_at.as_ref().map(|at| at as &DeformationAt),
             masked: masked_at.as_ref().map(|at| at as &MaskedAt),
         };
-        let written = files.finish(&plan, &gaps, camera, self.covariances.as_deref(), wall);
+        let covariances = self.covariances.as_deref();
+        let mut outputs = OutputSet::default();
+        let written = files.finish(&mut outputs, &plan, &gaps, camera, covariances, wall);
         terminal.finish();
         written?;
+        (self.record).add_to(&mut outputs, &output.run_file(), &self.inputs)?;
+        outputs.commit()?;
         let [width, height] = self.layout.size(&canvas);
         let report = StitchReport {
             out: &output.out,

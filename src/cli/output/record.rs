@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use crate::frames::hash_frames;
-use crate::persist::atomic;
+use crate::persist::atomic::OutputSet;
 use crate::persist::provenance::{self, HashError, Input};
 use crate::survey::Survey;
 use serde::Serialize;
@@ -45,6 +45,21 @@ impl RunRecord {
     /// # Errors
     /// A record that cannot be written.
     pub fn write(&self, path: &Path, inputs: &[Input]) -> Result<(), Failure> {
+        let mut outputs = OutputSet::default();
+        self.add_to(&mut outputs, path, inputs)?;
+        Ok(outputs.commit()?)
+    }
+
+    /// Adds the record of a run on `inputs` to the set of its outputs, as `path`.
+    ///
+    /// # Errors
+    /// A record that cannot be written.
+    pub fn add_to(
+        &self,
+        outputs: &mut OutputSet,
+        path: &Path,
+        inputs: &[Input],
+    ) -> Result<(), Failure> {
         let text = toml::to_string(&RunFile {
             schema_version: SCHEMA_VERSION,
             program: PROGRAM,
@@ -53,8 +68,7 @@ impl RunRecord {
             inputs,
         })
         .map_err(|error| Failure::bug(error.to_string()))?;
-        atomic::write_text(path, &(HEADER.to_owned() + &text))?;
-        Ok(())
+        Ok(outputs.write_text(path, &(HEADER.to_owned() + &text))?)
     }
 }
 

@@ -42,4 +42,6 @@ pub use static_pixels::{
 };
 pub use stored_frame::StoredFrame;
 pub use video::Video;
-pub use write::{FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};
+pub use write::{
+    FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, add_picture, write_picture,
+};

@@ -1,6 +1,6 @@
 //! Writing of picture files.
 
-use crate::persist::atomic::{self, WriteError};
+use crate::persist::atomic::{OutputSet, WriteError};
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::tiff::TiffEncoder;
@@ -71,6 +71,21 @@ pub fn write_picture(
     image: &DynamicImage,
     format: PictureFormat,
 ) -> Result<(), WriteError> {
+    let mut outputs = OutputSet::default();
+    add_picture(&mut outputs, path, image, format)?;
+    outputs.commit()
+}
+
+/// Adds a picture to a set of outputs.
+///
+/// # Errors
+/// An error of the operating system or of the encoder.
+pub fn add_picture(
+    outputs: &mut OutputSet,
+    path: &Path,
+    image: &DynamicImage,
+    format: PictureFormat,
+) -> Result<(), WriteError> {
     let refuse = |what: &str| {
         let size = format!("{} × {} px", image.width(), image.height());
         let what = format!("{size} are more than {what}, or lower --px-per-metre");
@@ -84,7 +99,7 @@ pub fn write_picture(
     if format == PictureFormat::Tiff && pixels > TIFF_LIMIT_PX {
         return refuse("a TIFF file holds; write .png");
     }
-    atomic::write(path, |writer| {
+    outputs.write(path, |writer| {
         encode(image, format, writer).map_err(|error| match error {
             ImageError::IoError(source) => source,
             other => io::Error::other(other),

@@ -8,7 +8,7 @@ use super::overviews::{LevelTile, OverviewBuilder, Waiting};
 use super::spec::{Georeference, Nodata, RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
 use super::spool::{Spool, Stored};
 use super::{deflate, jpeg};
-use crate::persist::atomic::{self, WriteError};
+use crate::persist::atomic::{OutputSet, WriteError};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -160,11 +160,11 @@ impl CogWriter {
         Ok(())
     }
 
-    /// Writes the file; a file of that name is replaced.
+    /// Writes the file and adds it to a set of outputs; a file of that name is replaced.
     ///
     /// # Errors
     /// [`RasterError::Incomplete`]; an error of the operating system.
-    pub fn finish(mut self) -> Result<(), RasterError> {
+    pub fn finish(mut self, outputs: &mut OutputSet) -> Result<(), RasterError> {
         let tiles = self.spec.tiles(self.stored.len());
         let levels: Vec<Vec<Stored>> = (self.stored.iter())
             .map(|tiles| tiles.iter().copied().flatten().collect())
@@ -174,7 +174,7 @@ impl CogWriter {
             return Err(RasterError::Incomplete { missing, tiles });
         }
         let head = self.head(&levels);
-        atomic::write(&self.target, |writer| {
+        outputs.write(&self.target, |writer| {
             writer.write_all(&head)?;
             let mut packed = Packed::default();
             for stored in levels.iter().rev().flatten() {

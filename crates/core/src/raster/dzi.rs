@@ -4,7 +4,7 @@ use super::error::RasterError;
 use super::jpeg;
 use super::overviews::{LevelTile, OverviewBuilder, Waiting};
 use super::spec::{RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
-use crate::persist::atomic::{self, StagedFolder, WriteError};
+use crate::persist::atomic::{self, OutputSet, StagedFolder, WriteError};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use serde::{Deserialize, Serialize};
@@ -160,24 +160,18 @@ impl DziWriter {
         Ok(())
     }
 
-    /// Renames the folder and then writes the `.dzi`; existing ones are replaced.
+    /// Adds the folder and the `.dzi` to a set of outputs; existing ones are replaced.
     ///
     /// # Errors
     /// [`RasterError::Incomplete`]; an error of the operating system.
-    pub fn finish(self) -> Result<(), RasterError> {
+    pub fn finish(self, outputs: &mut OutputSet) -> Result<(), RasterError> {
         let tiles = self.spec.tiles(self.levels);
         let missing = tiles - self.written;
         if missing > 0 {
             return Err(RasterError::Incomplete { missing, tiles });
         }
-        // An old description must not refer to the new folder.
-        atomic::remove_file(&self.target)?;
-        self.folder.finish()?;
-        let description = description(&self.spec, self.format);
-        atomic::write_text(&self.target, &description).inspect_err(|_| {
-            // The first error is more informative than a failure of the removal.
-            let _ = std::fs::remove_dir_all(files_folder(&self.target));
-        })?;
+        outputs.write_text(&self.target, &description(&self.spec, self.format))?;
+        outputs.folder(self.folder)?;
         Ok(())
     }
 
@@ -269,6 +263,12 @@ mod tests {
         names
     }
 
+    fn finish(writer: DziWriter) -> Result<(), RasterError> {
+        let mut outputs = OutputSet::default();
+        writer.finish(&mut outputs)?;
+        Ok(outputs.commit()?)
+    }
+
     #[test]
     fn a_picture_of_all_levels_appears_when_it_is_whole() {
         let dir = tempfile::tempdir().unwrap();
@@ -280,7 +280,7 @@ mod tests {
         writer.add(all).unwrap();
         assert_eq!(names(dir.path()).len(), 1, "a temporary folder only");
         writer.add(vec![last]).unwrap();
-        writer.finish().unwrap();
+        finish(writer).unwrap();
         assert_eq!(names(dir.path()), ["wall.dzi", "wall_files"]);
 
         let files = dir.path().join("wall_files");
@@ -304,7 +304,7 @@ mod tests {
         let format = DziFormat::Jpeg { quality: 90 };
         let mut writer = DziWriter::begin(&target, spec, format).unwrap();
         writer.add(tiles(&spec)).unwrap();
-        writer.finish().unwrap();
+        finish(writer).unwrap();
         let path = dir.path().join("wall_files/10/1_0.jpg");
         let tile = image::open(path).unwrap().to_luma8();
         assert_eq!(tile.dimensions(), (188, 100));
@@ -323,7 +323,7 @@ mod tests {
                 all.pop();
             }
             writer.add(all).unwrap();
-            assert_eq!(writer.finish().is_ok(), whole);
+            assert_eq!(finish(writer).is_ok(), whole);
             assert_eq!(names(dir.path()), ["wall.dzi", "wall_files"]);
         }
         assert_eq!(names(&dir.path().join("wall_files/10")).len(), 2);

@@ -17,6 +17,7 @@
 //! # Example
 //!
 //! ```
+//! use tunnelstitch_core::persist::atomic::OutputSet;
 //! use tunnelstitch_core::raster::{
 //!     CogWriter, Compression, TILE_EDGE_PX, RasterSpec, RasterTile, Reduce, SampleType,
 //! };
@@ -38,7 +39,9 @@
 //!     let pixels = vec![128; TILE_EDGE_PX * TILE_EDGE_PX];
 //!     writer.add(vec![RasterTile { column, row: 0, pixels }])?;
 //! }
-//! writer.finish()?;
+//! let mut outputs = OutputSet::default();
+//! writer.finish(&mut outputs)?;
+//! outputs.commit()?;
 //! assert_eq!(image::image_dimensions(&path)?, (700, 300));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -7,6 +7,7 @@ use crate::layout::sightings::px_per_metre;
 use crate::layout::tiles::{EDGE, tiles};
 use nalgebra::{Matrix2, Matrix6};
 use std::path::Path;
+use tunnelstitch_core::persist::atomic::OutputSet;
 use tunnelstitch_core::raster::{
     CogWriter, Compression, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
 };
@@ -131,11 +132,16 @@ impl Map {
         &self.values
     }
 
-    /// Writes the map as Cloud-Optimised GeoTIFF of single precision.
+    /// Adds the map to a set of outputs, as Cloud-Optimised GeoTIFF of single precision.
     ///
     /// # Errors
     /// As [`CogWriter`].
-    pub fn write(&self, path: &Path, layout: Layout) -> Result<(), RasterError> {
+    pub fn add_to(
+        &self,
+        outputs: &mut OutputSet,
+        path: &Path,
+        layout: Layout,
+    ) -> Result<(), RasterError> {
         let [width, height] = layout.size(&self.grid);
         let spec = RasterSpec {
             width,
@@ -168,7 +174,7 @@ impl Map {
             });
             writer.add(tiles.collect())?;
         }
-        writer.finish()
+        writer.finish(outputs)
     }
 
     fn at(&self, layout: Layout, pixel: [u32; 2]) -> f32 {

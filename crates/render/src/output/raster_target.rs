@@ -9,7 +9,7 @@ use crate::sampling::sample::Samples;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
-use tunnelstitch_core::persist::atomic::WriteError;
+use tunnelstitch_core::persist::atomic::{OutputSet, WriteError};
 use tunnelstitch_core::raster::{
     CogState, CogWriter, Compression, DziFormat, DziState, DziWriter, Georeference, Nodata,
     RasterError, RasterSpec, RasterTile, Reduce, SampleType, TILE_EDGE_PX, TileOrder,
@@ -140,14 +140,14 @@ impl RasterTarget {
         spec(canvas, format, layout, layer).pending_bytes(order)
     }
 
-    /// Completes the file and gives it its name.
+    /// Completes the file and adds it to a set of outputs.
     ///
     /// # Errors
     /// As [`CogWriter::finish`] and [`DziWriter::finish`].
-    pub fn finish(self) -> Result<(), RasterError> {
+    pub fn finish(self, outputs: &mut OutputSet) -> Result<(), RasterError> {
         match self.writer {
-            Writer::Cog(writer) => writer.finish(),
-            Writer::Dzi(writer) => writer.finish(),
+            Writer::Cog(writer) => writer.finish(outputs),
+            Writer::Dzi(writer) => writer.finish(outputs),
         }
     }
 

@@ -2,8 +2,9 @@
 
 use super::error::WriteError;
 use super::error_keeper::ErrorKeeper;
+use super::output_set::OutputSet;
 use super::parent::parent_folder;
-use super::{durable, temporary};
+use super::temporary::{self, TemporaryFile};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -17,31 +18,36 @@ pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<ErrorKeeper<File>>) -> std::io::Result<()>,
 ) -> Result<(), WriteError> {
+    let mut set = OutputSet::default();
+    set.write(path, fill)?;
+    set.commit()
+}
+
+/// Writes the content of the file `path` to a temporary file beside it.
+///
+/// # Errors
+/// An error of the operating system about the folder or writing.
+pub(super) fn fill_temporary(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<ErrorKeeper<File>>) -> std::io::Result<()>,
+) -> Result<TemporaryFile, WriteError> {
     let fail = |source| WriteError::new(path, source);
     check_replaceable_file(path).map_err(fail)?;
     let temporary = temporary::file_in(parent_folder(path)).map_err(fail)?;
-    let mut writer = BufWriter::new(ErrorKeeper::new(temporary.file));
+    let file = temporary.file.try_clone().map_err(fail)?;
+    let mut writer = BufWriter::new(ErrorKeeper::new(file));
     let filled = fill(&mut writer);
     // The cause, if the writer was an encoder with errors of its own.
     let error = writer.get_mut().error.take();
     filled.map_err(|other| fail(error.unwrap_or(other)))?;
-    let file = writer
+    writer
         .into_inner()
-        .map_err(|error| fail(error.into_error()))?
-        .writer;
+        .map_err(|error| fail(error.into_error()))?;
     // Files in an unfinished folder are synchronised together with the folder.
-    let is_final = !temporary::is_unfinished(path);
-    if is_final {
-        file.sync_all().map_err(fail)?;
+    if !temporary::is_unfinished(path) {
+        temporary.file.sync_all().map_err(fail)?;
     }
-    let renamed = temporary.path.persist(path);
-    renamed.map_err(|error| fail(error.error))?;
-    // Releases the lock.
-    drop(file);
-    if is_final {
-        durable::sync_folder(parent_folder(path));
-    }
-    Ok(())
+    Ok(temporary)
 }
 
 /// Writes a text file atomically; see [`write()`].

@@ -3,16 +3,17 @@
 use super::durable;
 use super::error::WriteError;
 use super::file::create_folder;
+use super::output_set::{OutputSet, content_of};
 use super::parent::parent_folder;
-use super::temporary::{self, REPLACED_NAME, TemporaryFolder};
+use super::temporary::{self, TemporaryFolder};
 use std::path::{Path, PathBuf};
 
 /// A folder that is filled under a temporary name beside its final one.
 pub struct StagedFolder {
-    folder: PathBuf,
-    /// The temporary folder; None if the folder is kept in any case.
-    temporary: Option<TemporaryFolder>,
     target: PathBuf,
+    folder: PathBuf,
+    /// What holds the folder; None if it is kept in any case.
+    temporary: Option<TemporaryFolder>,
 }
 
 impl StagedFolder {
@@ -23,28 +24,28 @@ impl StagedFolder {
     /// one that contains the working directory.
     pub fn begin(target: &Path) -> Result<Self, WriteError> {
         check_replaceable(target)?;
-        let parent = parent_folder(target);
-        create_folder(parent)?;
-        let temporary =
-            temporary::folder_in(parent).map_err(|source| WriteError::new(target, source))?;
+        create_folder(parent_folder(target))?;
+        let temporary = temporary_beside(target)?;
+        let folder = content_of(&temporary);
+        create_folder(&folder)?;
         Ok(Self {
-            folder: temporary.folder.path().to_owned(),
-            temporary: Some(temporary),
             target: target.to_owned(),
+            folder,
+            temporary: Some(temporary),
         })
     }
 
-    /// Continues the folder `target` from the existing `folder` on the same disk, which is kept in
-    /// any case.
+    /// Continues the folder `target` from the existing `folder` on the same disk, which is kept
+    /// until it is complete.
     ///
     /// # Errors
     /// The errors of [`StagedFolder::begin`].
     pub fn adopt(target: &Path, folder: &Path) -> Result<Self, WriteError> {
         check_replaceable(target)?;
         Ok(Self {
+            target: target.to_owned(),
             folder: folder.to_owned(),
             temporary: None,
-            target: target.to_owned(),
         })
     }
 
@@ -58,45 +59,32 @@ impl StagedFolder {
     /// # Errors
     /// An error of the operating system.
     pub fn finish(self) -> Result<(), WriteError> {
-        let fail = |source| WriteError::new(&self.target, source);
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            // A temporary folder is private; the finished one gets the permissions of its parent.
-            let mode = std::fs::metadata(parent_folder(&self.target))
-                .map_err(fail)?
-                .permissions()
-                .mode();
-            let mode = std::fs::Permissions::from_mode(mode & 0o777);
-            std::fs::set_permissions(&self.folder, mode).map_err(fail)?;
-        }
-        durable::sync_tree(&self.folder).map_err(fail)?;
-        // The old folder is renamed first and removed only when the new one is in place.
-        let mut old = None;
-        if self.target.exists() {
-            let aside = temporary::folder_in(parent_folder(&self.target)).map_err(fail)?;
-            std::fs::rename(&self.target, aside.folder.path().join(REPLACED_NAME)).map_err(fail)?;
-            old = Some(aside);
-        }
-        if let Err(error) = std::fs::rename(&self.folder, &self.target) {
-            if let Some(aside) = &old {
-                std::fs::rename(aside.folder.path().join(REPLACED_NAME), &self.target)
-                    .map_err(fail)?;
-            }
-            return Err(fail(error));
-        }
-        if let Some(TemporaryFolder { folder, .. }) = self.temporary {
-            // The folder is no longer temporary.
-            let _ = folder.keep();
-        }
-        durable::sync_folder(parent_folder(&self.target));
-        if let Some(aside) = old {
-            let aside = aside.folder.path();
-            // From now on it may be removed as abandoned.
-            std::fs::rename(aside.join(REPLACED_NAME), aside.join("replaced")).map_err(fail)?;
-        }
-        Ok(())
+        let mut set = OutputSet::default();
+        set.folder(self)?;
+        set.commit()
     }
+
+    /// The target and its content, synchronised to disk, in a temporary folder.
+    pub(super) fn into_complete(self) -> Result<(PathBuf, TemporaryFolder), WriteError> {
+        let fail = |source| WriteError::new(&self.target, source);
+        durable::sync_tree(&self.folder).map_err(fail)?;
+        let temporary = match self.temporary {
+            Some(temporary) => temporary,
+            // Under its own name, the old content would be taken for the new after the exchange.
+            None => {
+                let temporary = temporary_beside(&self.target)?;
+                std::fs::rename(&self.folder, content_of(&temporary)).map_err(fail)?;
+                temporary
+            }
+        };
+        Ok((self.target, temporary))
+    }
+}
+
+/// A temporary folder beside `target`.
+fn temporary_beside(target: &Path) -> Result<TemporaryFolder, WriteError> {
+    let folder = temporary::folder_in(parent_folder(target));
+    folder.map_err(|source| WriteError::new(target, source))
 }
 
 /// Rejects a folder that cannot be replaced as a whole.

@@ -5,16 +5,16 @@ use std::collections::BTreeSet;
 use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tempfile::{TempDir, TempPath};
 
 /// Prefix of temporary names.
 const PREFIX: &str = ".tunnelstitch-";
 
-/// Name, in a temporary folder, of a result that is being replaced. Such a folder is never removed
-/// as abandoned: it may hold the only copy.
-pub(super) const REPLACED_NAME: &str = "old";
+/// End of the temporary name of a result that is being replaced in several steps. It is never removed
+/// as abandoned: it may be the only copy.
+pub(super) const REPLACED_SUFFIX: &str = ".replaced";
 
 /// Temporary paths in use.
 static UNFINISHED_PATHS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -30,9 +30,7 @@ struct Listed(PathBuf);
 
 impl Listed {
     fn new(path: &Path) -> Self {
-        let mut list = UNFINISHED_PATHS
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut list = hold_list();
         list.push(path.to_owned());
         Self(path.to_owned())
     }
@@ -40,9 +38,7 @@ impl Listed {
 
 impl Drop for Listed {
     fn drop(&mut self) {
-        let mut list = UNFINISHED_PATHS
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut list = hold_list();
         list.retain(|path| *path != self.0);
     }
 }
@@ -51,9 +47,7 @@ impl Drop for Listed {
 /// terminated. The writers are not notified and must not continue, so the list stays locked until
 /// the process ends.
 pub fn remove_unfinished() {
-    let list = UNFINISHED_PATHS
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner);
+    let list = hold_list();
     for path in list.iter() {
         // A writer may still create a file in a folder while it is being removed.
         for _ in 0..MAX_REMOVAL_ATTEMPTS {
@@ -68,11 +62,17 @@ pub fn remove_unfinished() {
     std::mem::forget(list);
 }
 
+/// Holds the list of temporary paths, so that [`remove_unfinished`] waits until it is dropped. No
+/// temporary file or folder can be created or dropped meanwhile.
+pub(super) fn hold_list() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED_PATHS
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+}
+
 /// True if `path` is, or lies in, a temporary path of this process.
 pub(super) fn is_unfinished(path: &Path) -> bool {
-    let list = UNFINISHED_PATHS
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner);
+    let list = hold_list();
     list.iter().any(|unfinished| path.starts_with(unfinished))
 }
 
@@ -176,11 +176,21 @@ fn remove_abandoned(folder: &Path) {
 /// Locks a temporary file or folder if it is abandoned.
 fn lock_if_abandoned(path: &Path) -> Option<File> {
     let kind = path.symlink_metadata().ok()?.file_type();
-    if !(kind.is_file() || kind.is_dir()) || path.join(REPLACED_NAME).exists() {
+    if !(kind.is_file() || kind.is_dir()) || holds_replaced(path) {
         return None;
     }
     let file = File::open(path).ok()?;
     file.try_lock().is_ok().then_some(file)
+}
+
+/// True if `path` is a result that is being replaced, or a folder with one.
+fn holds_replaced(path: &Path) -> bool {
+    let is_replaced = |path: &Path| {
+        let name = path.as_os_str().as_encoded_bytes();
+        name.ends_with(REPLACED_SUFFIX.as_bytes())
+    };
+    let mut within = std::fs::read_dir(path).into_iter().flatten().flatten();
+    is_replaced(path) || within.any(|entry| is_replaced(&entry.path()))
 }
 
 fn remove(path: &Path) -> io::Result<()> {
@@ -203,7 +213,8 @@ mod tests {
         folder(".tunnelstitch-dead", "half.png");
         std::fs::write(path(".tunnelstitch-alive.part"), "half").unwrap();
         folder(".tunnelstitch-alive", "half.png");
-        folder(".tunnelstitch-aside", REPLACED_NAME);
+        folder(".tunnelstitch-aside", "content.replaced");
+        std::fs::write(path(".tunnelstitch-aside.part.replaced"), "old").unwrap();
         std::fs::write(path("result.tif"), "whole").unwrap();
         // Locked like by another process.
         let names = [".tunnelstitch-alive.part", ".tunnelstitch-alive"];
@@ -216,7 +227,8 @@ mod tests {
         let entries = std::fs::read_dir(dir.path()).unwrap();
         let mut left: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
         left.sort();
-        let expected = [names[1], names[0], ".tunnelstitch-aside", "result.tif"];
+        let aside = [".tunnelstitch-aside", ".tunnelstitch-aside.part.replaced"];
+        let expected = [names[1], names[0], aside[0], aside[1], "result.tif"];
         assert_eq!(left, expected);
     }
 

@@ -4,6 +4,12 @@ use crate::raster::test_picture::{grey_alpha, pixel, tiles};
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
+fn finish(writer: CogWriter) -> Result<(), RasterError> {
+    let mut outputs = OutputSet::default();
+    writer.finish(&mut outputs)?;
+    Ok(outputs.commit()?)
+}
+
 /// Writes a picture in batches of `batch` tiles, in the order of `order`, and returns the file.
 fn written(
     spec: RasterSpec,
@@ -19,7 +25,7 @@ fn written(
     for batch in all.chunks(batch) {
         writer.add(batch.to_vec()).unwrap();
     }
-    writer.finish().unwrap();
+    finish(writer).unwrap();
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
     std::fs::read(&target).unwrap()
 }
@@ -197,7 +203,7 @@ fn what_is_not_whole_leaves_the_old_file_and_no_litter() {
     let mut all = tiles(&spec);
     all.pop();
     writer.add(all).unwrap();
-    let error = writer.finish().unwrap_err().to_string();
+    let error = finish(writer).unwrap_err().to_string();
     assert!(error.contains("2 of 5 tiles"), "{error}");
     drop(CogWriter::begin(&target, spec, Compression::Deflate).unwrap());
     assert_eq!(std::fs::read_to_string(&target).unwrap(), "old");

@@ -47,6 +47,7 @@ impl FileBeginner<'_> {
         };
         Ok(MapFiles {
             folder: folder.to_owned(),
+            layout: self.layout,
             coverage: cog(COVERAGE, RasterLayer::Coverage, state.coverage)?,
             frames: cog(FRAMES, RasterLayer::Frames, state.frames)?,
             preview: match state.preview {

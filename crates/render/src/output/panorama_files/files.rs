@@ -12,8 +12,8 @@ use crate::output::raster_target::RasterTarget;
 use nalgebra::Matrix6;
 use std::borrow::Cow;
 use std::path::PathBuf;
-use tunnelstitch_core::frames::{PictureFormat, write_picture};
-use tunnelstitch_core::persist::atomic::WriteError;
+use tunnelstitch_core::frames::{PictureFormat, add_picture};
+use tunnelstitch_core::persist::atomic::{OutputSet, WriteError};
 use tunnelstitch_core::persist::checkpoint::Checkpoint;
 use tunnelstitch_core::raster::RasterError;
 use tunnelstitch_geometry::camera::Camera;
@@ -102,7 +102,7 @@ impl PanoramaFiles {
         self.coverage.gaps(surface)
     }
 
-    /// Gives all files their names, the panorama last.
+    /// Adds all files to a set of outputs.
     ///
     /// `camera` is that of the frames at full size, `covariances` those of their poses, if known.
     ///
@@ -110,6 +110,7 @@ impl PanoramaFiles {
     /// Whatever the system says.
     pub fn finish(
         self,
+        outputs: &mut OutputSet,
         plan: &Plan,
         gaps: &[Gap],
         camera: &Camera,
@@ -117,17 +118,17 @@ impl PanoramaFiles {
         wall: WallProperties,
     ) -> Result<(), RenderError> {
         if let Some(maps) = self.maps {
-            maps.finish(self.layout, plan, gaps, camera, covariances, wall)?;
-        }
-        if let Some(dzi) = self.dzi {
-            dzi.finish()?;
+            maps.finish(outputs, plan, gaps, camera, covariances, wall)?;
         }
         if let Some(cog) = self.cog {
-            cog.finish()?;
+            cog.finish(outputs)?;
         }
         if let Some((picture, format)) = self.picture {
             let image = picture.into_image(self.layout);
-            write_picture(&self.out, &image, format).map_err(RasterError::from)?;
+            add_picture(outputs, &self.out, &image, format).map_err(RasterError::from)?;
+        }
+        if let Some(dzi) = self.dzi {
+            dzi.finish(outputs)?;
         }
         Ok(())
     }

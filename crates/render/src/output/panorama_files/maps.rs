@@ -14,8 +14,8 @@ use image::DynamicImage;
 use nalgebra::Matrix6;
 use std::borrow::Cow;
 use std::path::PathBuf;
-use tunnelstitch_core::frames::{PictureFormat, write_picture};
-use tunnelstitch_core::persist::atomic::{self, WriteError};
+use tunnelstitch_core::frames::{PictureFormat, add_picture};
+use tunnelstitch_core::persist::atomic::{OutputSet, WriteError};
 use tunnelstitch_core::raster::RasterError;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::WallPoint;
@@ -62,6 +62,7 @@ pub struct WallProperties<'w> {
 /// Maps that are being written.
 pub(super) struct MapFiles {
     pub(super) folder: PathBuf,
+    pub(super) layout: Layout,
     pub(super) coverage: RasterTarget,
     pub(super) frames: RasterTarget,
     pub(super) preview: Preview,
@@ -85,13 +86,14 @@ impl MapFiles {
         [&mut self.coverage, &mut self.frames, &mut self.preview]
     }
 
-    /// Writes what is computed at the end and gives all maps their names.
+    /// Adds all maps to a set of outputs, with what is computed at the end. Those that this
+    /// panorama does not have are removed: they would belong to another.
     ///
     /// # Errors
     /// Whatever the system says.
     pub(super) fn finish(
         self,
-        layout: Layout,
+        outputs: &mut OutputSet,
         plan: &Plan,
         gaps: &[Gap],
         camera: &Camera,
@@ -99,37 +101,37 @@ impl MapFiles {
         wall: WallProperties,
     ) -> Result<(), RenderError> {
         let (surface, placements) = (plan.surface(), plan.placements());
-        self.coverage.finish()?;
-        self.frames.finish()?;
+        self.coverage.finish(outputs)?;
+        self.frames.finish(outputs)?;
         let grid = plan.grid();
         let labels = plan.seams().map(|seams| seams.labels());
         let resolution = Map::resolution(surface, camera, placements, &grid, labels);
-        resolution.write(&self.folder.join(RESOLUTION), layout)?;
-        let uncertainty = self.folder.join(UNCERTAINTY);
-        if let Some(covariances) = covariances {
-            let map = Map::uncertainty(surface, camera, placements, &grid, labels, covariances);
-            map.write(&uncertainty, layout)?;
-        } else {
-            // A map of an earlier panorama would belong to other poses.
-            atomic::remove_file(&uncertainty).map_err(RasterError::from)?;
-        }
-        let write = |name: &str, map: Option<Map>| -> Result<(), RenderError> {
+        let uncertainty = covariances.map(|covariances| {
+            Map::uncertainty(surface, camera, placements, &grid, labels, covariances)
+        });
+        let deformation = |which: usize| {
+            let of_wall = |at: &DeformationAt| Map::of_wall(&grid, |wall| at(wall)[which]);
+            wall.deformation.map(of_wall)
+        };
+        let masked = wall.masked.map(|at| Map::of_wall(&grid, at));
+        for (name, map) in [
+            (RESOLUTION, Some(resolution)),
+            (UNCERTAINTY, uncertainty),
+            (DEFORMATION, deformation(0)),
+            (DEFORMATION_SIGMA, deformation(1)),
+            (MASKED, masked),
+        ] {
             let path = self.folder.join(name);
             match map {
-                Some(map) => map.write(&path, layout)?,
-                None => atomic::remove_file(&path).map_err(RasterError::from)?,
+                Some(map) => map.add_to(outputs, &path, self.layout)?,
+                None => outputs.remove(&path).map_err(RasterError::from)?,
             }
-            Ok(())
-        };
-        for (which, name) in [DEFORMATION, DEFORMATION_SIGMA].into_iter().enumerate() {
-            let of_wall = |at: &DeformationAt| Map::of_wall(&grid, |wall| at(wall)[which]);
-            write(name, wall.deformation.map(of_wall))?;
         }
-        write(MASKED, wall.masked.map(|at| Map::of_wall(&grid, at)))?;
-        let preview = DynamicImage::from(self.preview.picture(surface, layout, 0.0));
-        write_picture(&self.folder.join(PREVIEW), &preview, PictureFormat::Png)
-            .map_err(RasterError::from)?;
-        atomic::write_text(&self.folder.join(GAPS), &gaps_csv(gaps)).map_err(RasterError::from)?;
-        Ok(())
+        let preview = DynamicImage::from(self.preview.picture(surface, self.layout, 0.0));
+        let path = self.folder.join(PREVIEW);
+        add_picture(outputs, &path, &preview, PictureFormat::Png).map_err(RasterError::from)?;
+        let gaps = gaps_csv(gaps);
+        let added = outputs.write_text(&self.folder.join(GAPS), &gaps);
+        Ok(added.map_err(RasterError::from)?)
     }
 }
