@@ -1,7 +1,9 @@
 //! The `tunnelstitch` program: starts the command line and maps errors to exit codes.
 
 use std::process::ExitCode;
-use tunnelstitch::cli::print_error;
+#[cfg(unix)]
+use std::sync::{Arc, atomic::AtomicBool};
+use tunnelstitch::cli::{Failure, print_error};
 
 fn main() -> ExitCode {
     // A panic in any thread is a bug and ends the program with the exit code of bugs.
@@ -15,6 +17,7 @@ fn main() -> ExitCode {
         std::process::exit(1);
     }));
     block_file_size_signal();
+    exit_without_memory();
     match tunnelstitch::cli::run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -36,3 +39,20 @@ fn block_file_size_signal() {
 
 #[cfg(not(unix))]
 fn block_file_size_signal() {}
+
+/// Ends the program with the code of temporary failures where it would abort. That is when memory
+/// ends, which has been printed then: a panic, the other reason, ends the program before.
+#[cfg(unix)]
+fn exit_without_memory() {
+    let always = Arc::new(AtomicBool::new(true));
+    let code = i32::from(Failure::temporary("").code);
+    // Without it, the program ends by the signal.
+    let _ = signal_hook::flag::register_conditional_shutdown(
+        signal_hook::consts::SIGABRT,
+        code,
+        always,
+    );
+}
+
+#[cfg(not(unix))]
+fn exit_without_memory() {}

@@ -121,3 +121,39 @@ fn too_little_memory_is_temporary() {
         assert!(message.contains("of memory"), "{message}");
     }
 }
+
+/// Wherever memory ends: never a signal, and never a half-written panorama.
+#[test]
+fn memory_that_ends_at_any_moment_is_temporary() {
+    let survey = first_frames(3);
+    let picture = survey.path().join("w.png");
+    let arguments = [
+        "stitch",
+        text(survey.path()),
+        "--out",
+        text(&picture),
+        "--px-per-metre",
+        "100",
+        "--threads",
+        "2",
+    ];
+    let mut codes = Vec::new();
+    for megabytes in (40..420).step_by(20) {
+        let output = limited(&format!("ulimit -v {megabytes}000"), &arguments, "");
+        let code = output.status.code();
+        let message = String::from_utf8_lossy(&output.stderr);
+        match code {
+            Some(0) => drop(image::open(&picture).expect("a whole panorama")),
+            _ => {
+                assert_eq!(code, Some(75), "{megabytes} MB: {message}");
+                assert!(message.contains("memory"), "{megabytes} MB: {message}");
+                assert!(!picture.exists() || codes.contains(&Some(0)));
+            }
+        }
+        codes.push(code);
+    }
+    assert!(
+        codes.contains(&Some(75)) && codes.contains(&Some(0)),
+        "{codes:?}"
+    );
+}
