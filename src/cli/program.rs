@@ -9,6 +9,7 @@ use super::output::{Failure, RunRecord, Terminal, print_error};
 use crate::persist::atomic;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::sync::Arc;
+use tunnelstitch_geometry::numerics::simd_dispatch::{SimdLimit, limit_simd};
 
 /// Refines the trajectory of a rotating tunnel camera by photometric bundle adjustment and unrolls
 /// the wall into one metric panorama.
@@ -40,6 +41,37 @@ struct GlobalArguments {
         value_parser = clap::value_parser!(u16).range(1..=1024)
     )]
     threads: Option<u16>,
+    /// Widest vector instructions to use. The result does not depend on it.
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        default_value_t,
+        hide_short_help = true
+    )]
+    simd: SimdArgument,
+}
+
+/// Names of vector instructions.
+#[derive(Clone, Copy, Debug, Default, clap::ValueEnum)]
+enum SimdArgument {
+    /// The widest of the processor.
+    #[default]
+    Widest,
+    /// AVX2, if the processor has it.
+    Avx2,
+    /// Those that every processor of its kind has.
+    Baseline,
+}
+
+impl From<SimdArgument> for SimdLimit {
+    fn from(argument: SimdArgument) -> Self {
+        match argument {
+            SimdArgument::Widest => Self::Widest,
+            SimdArgument::Avx2 => Self::Avx2,
+            SimdArgument::Baseline => Self::Baseline,
+        }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -88,6 +120,7 @@ pub fn run() -> Result<(), Failure> {
                 "cannot start the threads: {error}; give fewer --threads, or end other programs"
             ))
         })?;
+    limit_simd(cli.global.simd.into());
     handle_interrupts(&cli.command)?;
     let terminal = Arc::new(Terminal::new(cli.global.quiet));
     cli.command.run(&command, &record, &terminal)

@@ -10,6 +10,7 @@ mod config;
 mod converge;
 mod exit_codes;
 mod export;
+mod faults;
 mod fittings;
 mod gyro;
 mod lenses;

@@ -71,6 +71,27 @@ fn any_number_of_threads_gives_the_same_bytes() {
     assert!(bytes("1") == bytes("2"));
 }
 
+/// Plain loops and vectors of every width give the same numbers, with every interpolation.
+#[test]
+fn any_vector_instructions_give_the_same_bytes() {
+    let survey = first_frames(4);
+    let bytes = |simd: &str, more: &[&str]| {
+        let out = survey.path().join(format!("{simd}.png"));
+        stitch(survey.path(), &out, &[&["--simd", simd], more].concat());
+        std::fs::read(out).unwrap()
+    };
+    for more in [
+        &[][..],
+        &["--mode", "average"],
+        &["--mode", "median", "--interpolation", "bilinear"],
+        &["--interpolation", "lanczos3"],
+    ] {
+        let widest = bytes("widest", more);
+        assert!(widest == bytes("avx2", more), "AVX2, {more:?}");
+        assert!(widest == bytes("baseline", more), "no vectors, {more:?}");
+    }
+}
+
 #[test]
 fn chainage_right_is_the_picture_turned() {
     let survey = first_frames(4);

@@ -4,6 +4,7 @@
 pub mod chromium;
 pub mod missing;
 pub mod npm;
+pub mod outputs;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

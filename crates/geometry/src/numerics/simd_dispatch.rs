@@ -1,6 +1,47 @@
 //! Run-time dispatch of loops to the widest vector instructions of the processor.
 
 use pulp::{Arch, Simd, WithSimd};
+use std::sync::atomic::{AtomicU8, Ordering};
+
+/// The widest vector instructions that the process uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum SimdLimit {
+    /// Those of the processor.
+    #[default]
+    Widest,
+    /// AVX2, if the processor has it.
+    Avx2,
+    /// Those that every processor of its kind has.
+    Baseline,
+}
+
+/// The [`SimdLimit`] of the process.
+static LIMIT: AtomicU8 = AtomicU8::new(SimdLimit::Widest as u8);
+
+/// Limits the vector instructions of the process, to test that numbers do not depend on them.
+pub fn limit_simd(limit: SimdLimit) {
+    LIMIT.store(limit as u8, Ordering::Relaxed);
+}
+
+/// True if the process is limited to `limit`.
+#[inline(always)]
+fn is_limited_to(limit: SimdLimit) -> bool {
+    LIMIT.load(Ordering::Relaxed) == limit as u8
+}
+
+/// The instructions to use.
+#[inline(always)]
+fn arch() -> Arch {
+    if is_limited_to(SimdLimit::Widest) {
+        return Arch::new();
+    }
+    #[cfg(target_arch = "x86_64")]
+    if let (true, Some(simd)) = (is_limited_to(SimdLimit::Avx2), pulp::x86::V3::try_new()) {
+        return Arch::V3(simd);
+    }
+    Arch::Scalar
+}
 
 /// Runs `work` with code compiled for this processor's vector instructions.
 ///
@@ -10,7 +51,7 @@ use pulp::{Arch, Simd, WithSimd};
 /// nothing is contracted to a fused multiply–add.
 #[inline(always)]
 pub fn dispatch_simd<R>(work: impl FnMut() -> R) -> R {
-    Arch::new().dispatch(Work(work))
+    arch().dispatch(Work(work))
 }
 
 struct Work<F>(F);
@@ -32,6 +73,9 @@ impl<R, F: FnMut() -> R> WithSimd for Work<F> {
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub fn dispatch_avx2(work: impl FnMut(pulp::x86::V3)) -> bool {
+    if is_limited_to(SimdLimit::Baseline) {
+        return false;
+    }
     let Some(simd) = pulp::x86::V3::try_new() else {
         return false;
     };
