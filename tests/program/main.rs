@@ -12,6 +12,7 @@ mod exit_codes;
 mod export;
 mod faults;
 mod fittings;
+mod fuzzed;
 mod gyro;
 mod lenses;
 mod locate;

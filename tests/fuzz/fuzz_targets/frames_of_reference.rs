@@ -1,16 +1,5 @@
-//! Camera mounts and tunnel frames.
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
-use tunnelstitch::trajectory::{read_camera_in_body, read_tunnel_frame};
-use tunnelstitch_fuzz::file;
-
-fuzz_target!(|data: &[u8]| {
-    let (_folder, path) = file("frame.yaml", data);
-    for pose in [read_camera_in_body(&path), read_tunnel_frame(&path)]
-        .into_iter()
-        .flatten()
-    {
-        assert!(pose.t_wc.iter().all(|v| v.is_finite()));
-    }
-});
+libfuzzer_sys::fuzz_target!(
+    |data: &[u8]| tunnelstitch_fuzz::targets::frames_of_reference::run(data)
+);

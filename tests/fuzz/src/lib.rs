@@ -1,5 +1,7 @@
 //! Helpers of the targets: files with the fuzzer's content, and a small survey to read them with.
 
+pub mod targets;
+
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use tempfile::TempDir;

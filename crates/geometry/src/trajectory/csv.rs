@@ -214,7 +214,7 @@ fn parse_record(
     };
     let name = match columns.name.map(word) {
         Some("") => return Err("the frame has no name".to_owned()),
-        name => name.map(|name| from_cell(name).to_owned()),
+        name => name.map(|name| name_from_cell(name).to_owned()),
     };
     Ok(PoseEntry {
         name,
@@ -249,6 +249,33 @@ fn is_formula(text: &str) -> bool {
     text.starts_with(['=', '+', '-', '@', '\t', '\r'])
 }
 
+/// The name of a frame as a cell. One with blanks at an end, which readers of tables take away, gets
+/// an apostrophe at both, and so does one that has them already; [`name_from_cell`] takes them away.
+fn name_to_cell(name: &str) -> Cow<'_, str> {
+    if has_outer_blanks(name) {
+        Cow::Owned(format!("'{name}'"))
+    } else {
+        to_cell(name)
+    }
+}
+
+/// The name of a cell that [`name_to_cell`] has made.
+fn name_from_cell(cell: &str) -> &str {
+    let inner = cell
+        .strip_prefix('\'')
+        .and_then(|rest| rest.strip_suffix('\''));
+    match inner {
+        Some(name) if has_outer_blanks(name) => name,
+        _ => from_cell(cell),
+    }
+}
+
+/// True for a name with blanks at an end, within any apostrophes.
+fn has_outer_blanks(name: &str) -> bool {
+    let name = name.trim_matches('\'');
+    name.trim() != name
+}
+
 /// Formats a CSV of poses; `names` are those of the frames.
 pub fn format(names: &[String], trajectory: &[StampedPose]) -> String {
     let mut writer = WriterBuilder::new()
@@ -260,8 +287,8 @@ pub fn format(names: &[String], trajectory: &[StampedPose]) -> String {
     for (name, StampedPose { time_s, pose }) in names.iter().zip(trajectory) {
         let (t, q) = (&pose.t_wc, &pose.r_wc);
         let numbers = [*time_s, t.x, t.y, t.z, q.i, q.j, q.k, q.w];
-        let words =
-            std::iter::once(to_cell(name).into_owned()).chain(numbers.iter().map(f64::to_string));
+        let words = std::iter::once(name_to_cell(name).into_owned())
+            .chain(numbers.iter().map(f64::to_string));
         let _ = writer.write_record(words);
     }
     let bytes = writer.into_inner().unwrap_or_default();
@@ -282,6 +309,11 @@ mod tests {
             "-1",
             "# x",
             "\u{1b}[m",
+            " a ",
+            "' a ",
+            "'b '",
+            "=1 ",
+            "\tc",
         ];
         let names = names.map(str::to_owned);
         let pose = Pose::identity();

@@ -1,0 +1,23 @@
+//! Calibration files of every kind; the first byte selects the extension.
+
+use super::super::file;
+use tunnelstitch::camera::{ColmapCamera, format_calibration, read_calibration};
+
+const ENDINGS: [&str; 4] = ["json", "toml", "yaml", "txt"];
+
+/// Reads the input.
+pub fn run(data: &[u8]) {
+    let Some((first, content)) = data.split_first() else {
+        return;
+    };
+    let ending = ENDINGS[usize::from(*first) % ENDINGS.len()];
+    let (_folder, path) = file(&format!("camera.{ending}"), content);
+    let _ = read_calibration(&path, Some("cam0"));
+    if let Ok(camera) = read_calibration(&path, None) {
+        // A camera that was read can be used and written.
+        let _ = camera.border(4, 0.5);
+        let _ = ColmapCamera::of(&camera).map(|colmap| colmap.cameras_txt());
+        let (_folder, own) = file("own.json", format_calibration(&camera).as_bytes());
+        assert_eq!(read_calibration(&own, None).unwrap(), camera);
+    }
+}

@@ -1,0 +1,45 @@
+//! Files of poses; the first byte selects the format, detected or given, and the association with
+//! frames.
+
+use super::super::{file, small_survey};
+use std::path::PathBuf;
+use tunnelstitch::survey::{Associate, Survey};
+use tunnelstitch::trajectory::{Pose, PoseFormat, read_poses};
+
+const FORMATS: [Option<PoseFormat>; 7] = [
+    None,
+    Some(PoseFormat::Tum),
+    Some(PoseFormat::Kitti),
+    Some(PoseFormat::Csv),
+    Some(PoseFormat::Colmap),
+    Some(PoseFormat::Nerfstudio),
+    Some(PoseFormat::Euroc),
+];
+const TIES: [Option<Associate>; 4] = [
+    None,
+    Some(Associate::Order),
+    Some(Associate::Name),
+    Some(Associate::Time),
+];
+
+/// Reads the input.
+pub fn run(data: &[u8]) {
+    let Some((first, content)) = data.split_first() else {
+        return;
+    };
+    let choice = usize::from(*first);
+    let format = FORMATS[choice % FORMATS.len()];
+    let (_folder, path) = file("poses.txt", content);
+    let Ok(read) = read_poses(&path, format) else {
+        return;
+    };
+    let finite = |pose: &Pose| pose.t_wc.iter().all(|v| v.is_finite());
+    assert!(read.entries.iter().all(|entry| finite(&entry.pose)));
+    let _ = Survey::open_with(small_survey(), |survey| {
+        survey.frames.times = (choice % 3 == 0).then(|| PathBuf::from("times.txt"));
+        survey.poses.initial = path.clone();
+        survey.poses.format = format;
+        survey.poses.associate = TIES[choice / FORMATS.len() % TIES.len()];
+        survey.poses.interpolate = Some(choice % 2 == 0);
+    });
+}
