@@ -62,6 +62,38 @@ fn poses_without_motion_are_refused() {
     assert!(message.contains("all initial poses are equal"), "{message}");
 }
 
+/// The wall between would take all memory.
+#[test]
+fn a_pose_far_from_all_others_is_refused() {
+    for far in ["4e3", "1e160", "-1e9"] {
+        let survey = first_frames(3);
+        let poses = survey.path().join("baseline.tum");
+        let text_of = std::fs::read_to_string(&poses).unwrap();
+        let mut words: Vec<&str> = text_of.lines().nth(1).unwrap().split(' ').collect();
+        words[2] = far;
+        let moved: Vec<String> = (text_of.lines().enumerate())
+            .map(|(k, line)| {
+                if k == 1 {
+                    words.join(" ")
+                } else {
+                    line.to_owned()
+                }
+            })
+            .collect();
+        std::fs::write(&poses, moved.join("\n")).unwrap();
+        for command in ["check", "refine", "stitch"] {
+            let out = survey.path().join("out.png");
+            let arguments = match command {
+                "check" => vec![command, text(survey.path())],
+                _ => vec![command, text(survey.path()), "--out", text(&out)],
+            };
+            let (code, message) = run_within(&arguments, MAX_REFUSAL_S);
+            assert_eq!(code, Some(3), "{command} {far}: {message}");
+            assert!(message.contains("no camera is between"), "{message}");
+        }
+    }
+}
+
 #[test]
 fn ignored_regions_have_a_number() {
     let region = |k: usize| format!("{{chainage_m=[{k},{}]}},", k + 1);

@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::files::printed;
-use tunnelstitch_geometry::surface::Surface;
+use tunnelstitch_geometry::surface::{Surface, mean_radius_m};
 use tunnelstitch_geometry::trajectory::{Convention, Pose, TunnelAxis, so3};
 
 /// Smallest number of frames from which a convention is judged.
@@ -30,6 +30,9 @@ const MAX_AXIAL_FRACTION: f64 = 0.05;
 const MIN_ASKEW_ANGLE_RAD: f64 = std::f64::consts::FRAC_PI_3;
 /// Angle from the axis within which motion and rotation are along it.
 const MAX_ALIGNED_ANGLE_RAD: f64 = std::f64::consts::FRAC_PI_6;
+/// Longest piece of a tunnel without a camera between two, in radii: 3 km of a road tunnel. Wall
+/// that nothing sees costs memory, too, and a pose far from all others is a slip.
+const MAX_GAP_RADII: f64 = 1000.0;
 
 /// Statistics of poses in the tunnel.
 struct PoseSummary {
@@ -389,6 +392,7 @@ pub(super) fn validate_poses(
             },
         });
     }
+    check_gaps(surface, poses, path)?;
     if stand.is_wrong()
         && let Some(other) = remedy()
     {
@@ -412,6 +416,30 @@ pub(super) fn validate_poses(
         )]);
     }
     Ok(Vec::new())
+}
+
+/// Refuses cameras far from all others along the tunnel.
+fn check_gaps(surface: &dyn Surface, poses: &[Pose], path: &Path) -> Result<(), SurveyError> {
+    let mut stations: Vec<(f64, usize)> = (poses.iter().enumerate())
+        .map(|(frame, pose)| (surface.chainage_m(&pose.t_wc), frame))
+        .collect();
+    stations.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let max_m = MAX_GAP_RADII * mean_radius_m(surface);
+    let gap = stations
+        .windows(2)
+        .find(|pair| pair[1].0 - pair[0].0 > max_m);
+    let Some([(from_m, before), (to_m, after)]) = gap else {
+        return Ok(());
+    };
+    Err(SurveyError::Association {
+        path: path.to_owned(),
+        what: format!(
+            "frames {before} and {after} are {:.0} m apart along the tunnel (chainage {from_m:.1} \
+             and {to_m:.1} m), and no camera is between them; check their poses and units, or \
+             make a survey of each part",
+            to_m - from_m
+        ),
+    })
 }
 
 #[cfg(test)]

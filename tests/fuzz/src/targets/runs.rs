@@ -1,12 +1,14 @@
-//! Whole runs of `refine` and of `stitch` on poses and a camera with a fuzzer's numbers: 13 bytes for
-//! a number to change, its place and its bits.
+//! Whole runs of `refine` and of `stitch` on files of poses and of a camera with a fuzzer's numbers:
+//! nine bytes for a number to change, its place and its bits.
 
-use super::super::small_survey;
+use super::super::{file, small_survey};
 use std::sync::Arc;
+use tunnelstitch::camera::format_calibration;
 use tunnelstitch::progress::{Progress, Silent};
 use tunnelstitch::refine::{RefineInput, RefineOptions, refine};
 use tunnelstitch::render::{Stitch, StitchOptions};
 use tunnelstitch::survey::Survey;
+use tunnelstitch::trajectory::tum;
 
 /// Runs both. They fail, or give finite poses and a panorama.
 pub fn run(data: &[u8]) {
@@ -28,6 +30,15 @@ pub fn run(data: &[u8]) {
             _ => survey.initial[frame].time_s = value,
         }
     }
+    let (_folder, initial) = file("poses.tum", tum::format(&survey.initial).as_bytes());
+    let (_folder, camera) = file("camera.json", format_calibration(&survey.camera).as_bytes());
+    let opened = Survey::open_with(small_survey(), |file| {
+        file.poses.initial = initial.clone();
+        file.camera.file = camera.clone();
+    });
+    let Ok(survey) = opened else {
+        return;
+    };
     let poses = survey.initial_poses();
     let options = StitchOptions {
         px_per_metre: Some(5.0),

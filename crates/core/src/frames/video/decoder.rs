@@ -150,10 +150,10 @@ fn listen(log: impl BufRead, times: &Sender<[i128; 2]>) -> Vec<String> {
         let line = String::from_utf8_lossy(&line);
         if let Some(found) = after(&line, "config in time_base:").and_then(fraction) {
             tick_s = found;
-        } else if let Some(ticks) = after(&line, " pts:").and_then(|word| word.parse::<i128>().ok())
+        } else if let Some(ticks) = after(&line, " pts:").and_then(|word| word.parse::<i64>().ok())
         {
             // The receiver may have been dropped.
-            let _ = times.send([ticks * tick_s[0], tick_s[1]]);
+            let _ = times.send([i128::from(ticks) * tick_s[0], tick_s[1]]);
         } else if let Some((_, what)) = line.split_once("[error] ").or(line.split_once("[fatal] "))
         {
             complaints.push(what.trim().to_owned());
@@ -170,8 +170,8 @@ fn after<'a>(line: &'a str, text: &str) -> Option<&'a str> {
 
 fn fraction(word: &str) -> Option<[i128; 2]> {
     let (num, den) = word.split_once('/')?;
-    let (num, den) = (num.parse().ok()?, den.parse().ok()?);
-    (num > 0 && den > 0).then_some([num, den])
+    let (num, den): (i64, i64) = (num.parse().ok()?, den.parse().ok()?);
+    (num > 0 && den > 0).then_some([num, den].map(i128::from))
 }
 
 #[cfg(test)]
