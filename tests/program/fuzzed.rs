@@ -8,8 +8,8 @@ use std::path::Path;
 mod fuzz;
 
 /// Damaged copies for each target; fewer where one takes long.
-const COPIES: usize = 200;
-const FEW_COPIES: usize = 8;
+const COPIES: usize = 500;
+const FEW_COPIES: usize = 40;
 
 /// Targets that refine or serve, and one that needs another ffprobe.
 const SLOW: [&str; 2] = ["runs", "gyro"];

@@ -94,6 +94,21 @@ fn a_pose_far_from_all_others_is_refused() {
     }
 }
 
+/// The prior of a random walk is as wide as the wall after it, and the search is not.
+#[test]
+fn a_pause_of_years_takes_seconds() {
+    let survey = first_frames(4);
+    let poses = survey.path().join("baseline.tum");
+    let lines = std::fs::read_to_string(&poses).unwrap();
+    let (before, last) = lines.trim_end().rsplit_once('\n').unwrap();
+    let (_, pose) = last.split_once(' ').unwrap();
+    std::fs::write(&poses, format!("{before}\n1e9 {pose}\n")).unwrap();
+    let out = survey.path().join("out");
+    let refine = ["refine", text(survey.path()), "--out", text(&out)];
+    let (code, message) = run_within(&refine, 10 * MAX_REFUSAL_S);
+    assert!(matches!(code, Some(0 | 4)), "{code:?}: {message}");
+}
+
 #[test]
 fn ignored_regions_have_a_number() {
     let region = |k: usize| format!("{{chainage_m=[{k},{}]}},", k + 1);

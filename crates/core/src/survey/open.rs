@@ -19,7 +19,8 @@ use tunnelstitch_geometry::surface::{
     Bend, RadialField, Surface, WallRegions, bent, displaced, with_range,
 };
 use tunnelstitch_geometry::trajectory::{
-    Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of, read_tunnel_frame,
+    Convention, Jitter, MAX_SEARCH_VOLUME_DEG3, Pose, Shutter, StampedPose, Trajectory, poses_of,
+    read_tunnel_frame,
 };
 
 /// A survey, read and validated, except the pixels.
@@ -369,10 +370,6 @@ pub fn toml_path(path: &Path) -> PathBuf {
         path.to_owned()
     }
 }
-
-/// Largest volume in which a frame is searched for, cubic degrees (1-σ): at 320 × 240 px, a frame
-/// takes two to three seconds of a processor at this width, and its time grows with the volume.
-const MAX_SEARCH_VOLUME_DEG3: f64 = 8000.0;
 
 /// Checks the numbers of a survey's file that stand for themselves; returns what is wrong.
 fn check_values(file: &SurveyFile) -> Result<(), String> {

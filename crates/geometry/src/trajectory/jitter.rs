@@ -6,6 +6,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// Correlation of the errors of consecutive poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,6 +30,11 @@ pub struct Jitter {
     pub translation_sigma_m: [f64; 3],
 }
 
+/// Largest volume in which a frame is searched for, cubic degrees (1-σ), as for 20° about each axis:
+/// at 320 × 240 px, a frame takes two to three seconds of a processor at this width, and its time
+/// grows with the volume.
+pub const MAX_SEARCH_VOLUME_DEG3: f64 = 8000.0;
+
 /// Fraction of the lateral offset, and of the tilt against the axis, that a random walk loses at
 /// each step, because the carrier steers back to the axis. 2 % keeps their spread below
 /// `σ / √(1 − 0.98²) ≈ 5 σ`, for any length.
@@ -46,18 +52,35 @@ fn steered(executed: &UnitQuaternion<f64>, planned: &UnitQuaternion<f64>) -> Uni
 }
 
 impl Jitter {
-    /// Volume in which a frame is searched for, cubic degrees: the product of the 1-σ of pitch, yaw
-    /// and roll as they appear in the picture of a wall at `distance_m`,
-    /// `√(σ_R² + (σ_y/d)²) · √(σ_R² + (max(σ_x, σ_z)/d)²) · σ_R`, each at most half a turn. A
-    /// translation across the view looks like a rotation.
-    pub fn search_volume_deg3(&self, distance_m: f64) -> f64 {
+    /// σ of pitch, yaw and roll as they appear in the picture of a wall at `distance_m`, radians:
+    /// `√(σ_R² + (σ_y/d)²)`, `√(σ_R² + (max(σ_x, σ_z)/d)²)`, `σ_R`. A translation across the view
+    /// looks like a rotation.
+    fn picture_sigma_rad(&self, distance_m: f64) -> [f64; 3] {
         let [x, y, z] = self.translation_sigma_m;
         let rotation = self.rotation_sigma_rad;
         let across = |shift_m: f64| rotation.hypot(shift_m / distance_m);
         [across(y), across(x.max(z)), rotation]
-            .map(|sigma_rad| sigma_rad.to_degrees().min(180.0))
+    }
+
+    /// Volume in which a frame is searched for, cubic degrees: the product of the 1-σ of pitch, yaw
+    /// and roll as they appear in the picture of a wall at `distance_m`, each at most half a turn.
+    pub fn search_volume_deg3(&self, distance_m: f64) -> f64 {
+        let sigma_rad = self.picture_sigma_rad(distance_m);
+        sigma_rad
+            .map(|sigma| sigma.min(PI).to_degrees())
             .iter()
             .product()
+    }
+
+    /// σ of pitch, yaw and roll of the search for a frame, radians: those in the picture of a wall
+    /// at `distance_m` times `scale`, as where frames are missing before it; after a long pause,
+    /// those of [`MAX_SEARCH_VOLUME_DEG3`].
+    pub fn search_sigma_rad(&self, distance_m: f64, scale: f64) -> [f64; 3] {
+        let sigma_rad = self.picture_sigma_rad(distance_m);
+        let sigma_rad = sigma_rad.map(|sigma| (scale * sigma).min(PI));
+        let volume_deg3: f64 = sigma_rad.map(f64::to_degrees).iter().product();
+        let shrink = (MAX_SEARCH_VOLUME_DEG3 / volume_deg3).cbrt().min(1.0);
+        sigma_rad.map(|sigma| shrink * sigma)
     }
 
     /// Simulates the execution of `plan` with this noise.
@@ -108,6 +131,21 @@ mod tests {
             model,
             rotation_sigma_rad: 2f64.to_radians(),
             translation_sigma_m: [0.02, 0.02, 0.03],
+        }
+    }
+
+    #[test]
+    fn a_search_grows_with_a_pause_up_to_the_largest_volume() {
+        let jitter = jitter(JitterModel::RandomWalk);
+        let volume_deg3 = |scale| -> f64 {
+            let sigma_rad = jitter.search_sigma_rad(3.0, scale);
+            sigma_rad.map(f64::to_degrees).iter().product()
+        };
+        let one = jitter.search_volume_deg3(3.0);
+        assert!((volume_deg3(1.0) / one - 1.0).abs() < 1e-12);
+        assert!((volume_deg3(2.0) / one - 8.0).abs() < 1e-12);
+        for scale in [31.0, 1e6, f64::INFINITY] {
+            assert!((volume_deg3(scale) / MAX_SEARCH_VOLUME_DEG3 - 1.0).abs() < 1e-12);
         }
     }
 

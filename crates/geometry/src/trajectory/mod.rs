@@ -59,7 +59,7 @@ pub use axes::{CameraAxes, Direction};
 pub use convention::Convention;
 pub use error::PoseError;
 pub use format::PoseFormat;
-pub use jitter::{Jitter, JitterModel};
+pub use jitter::{Jitter, JitterModel, MAX_SEARCH_VOLUME_DEG3};
 pub use mount::read_camera_in_body;
 pub use plan::{Mounting, PlanTable, Rate, Station, UniformMotion, spiral};
 pub use pose::Pose;

@@ -28,7 +28,7 @@ use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use tunnelstitch_geometry::surface::viewing_distance;
-use tunnelstitch_geometry::trajectory::{Jitter, Pose};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Largest deficit of a hypothesis to the best one with which it is refined, nats: log-posterior
 /// odds of `ln(MAX_HYPOTHESES/0.001)`. Of ten hypotheses, a right one is dismissed at most once in
@@ -145,7 +145,7 @@ struct Registration<'r> {
     search_level: usize,
     /// Pyramid level of the estimate.
     finest_level: usize,
-    /// σ of pitch, yaw and roll as they appear in the picture, radians.
+    /// σ of pitch, yaw and roll of the search, radians.
     sigma_rad: [f64; 3],
     /// Which neighbours may share wall with the frame.
     overlapping: Vec<bool>,
@@ -169,8 +169,8 @@ impl<'r> Registration<'r> {
         let finest_level = options.handover_level(side);
         let search_level = finest_level.max(coarsest_level.saturating_sub(1));
         let camera = context.camera.at_level(search_level);
-        let sigma_rad = picture_sigma_rad(&context.prior.jitter, distance_m);
-        let sigma_rad = sigma_rad.map(|sigma| sigma * predicted.sigma_scale);
+        let jitter = &context.prior.jitter;
+        let sigma_rad = jitter.search_sigma_rad(distance_m, predicted.sigma_scale);
         // Beyond half a turn there is no more wall to look at.
         let widest_m = 0.5 * context.surface.perimeter_m();
         let reach_m = MAX_DEVIATION_SIGMA * sigma_rad[1].max(sigma_rad[0]) * distance_m;
@@ -365,15 +365,6 @@ fn is_worth_refining(hypothesis: &Hypothesis, best_score: f64) -> bool {
 /// True if a closer search has raised the log-posterior by more than noise does.
 fn has_gained(before: f64, after: f64) -> bool {
     after - before >= MIN_SCORE_GAIN_NATS
-}
-
-/// σ of pitch, yaw and roll as they appear in the picture, radians: a translation across the view
-/// looks like a rotation.
-fn picture_sigma_rad(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
-    let rotation = jitter.rotation_sigma_rad;
-    let [x, y, z] = jitter.translation_sigma_m;
-    let (along, across) = (y / distance_m, x.max(z) / distance_m);
-    [rotation.hypot(along), rotation.hypot(across), rotation]
 }
 
 #[cfg(test)]
