@@ -1,5 +1,5 @@
-//! Faults of the system at every call that opens or writes, and kills there, by `strace`: what was there
-//! before stays or is replaced as a whole, and the same command ends with the same bytes.
+//! Faults of the system at every call that opens or writes, and kills there, by `strace`: what was
+//! there before stays or is replaced as a whole, and the same command ends with the same bytes.
 #![cfg(target_os = "linux")]
 
 use crate::support::outputs::{Outputs, files, outputs};
@@ -84,7 +84,7 @@ impl<'a> Job<'a> {
         (1..=calls).step_by(step).collect()
     }
 
-    /// What a user sees: neither temporary files nor checkpoints.
+    /// Files that a user sees: neither temporary files nor checkpoints.
     fn seen(&self) -> Outputs {
         let mut seen = outputs(&self.folder);
         seen.retain(|path, _| {
@@ -128,7 +128,7 @@ impl<'a> Job<'a> {
         self.assert_ends(&option);
     }
 
-    /// The same command ends with the same files and nothing else.
+    /// Checks that the same command ends with the same files and nothing else.
     fn assert_ends(&self, option: &str) {
         succeed(&self.arguments);
         let found = outputs(&self.folder);

@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 
 /// The directions that a lens shows: those at less than a limit off its axis.
 ///
-/// The limit is that of the model, where the radius stops rising, or a smaller one that a calibration
-/// gives.
+/// The limit is that of the model, where the radius stops rising, or a smaller one that a
+/// calibration gives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOfView {
     /// Largest angle to be used, radians; π if only the model limits it.

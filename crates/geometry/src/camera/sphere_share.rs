@@ -1,5 +1,6 @@
-//! Denominators `α d + (1 − α) z` of the enhanced unified and the double-sphere model: the projection
-//! from a unit sphere (or an ellipsoid that is stretched to one), α of the way to its centre.
+//! Denominators `α d + (1 − α) z` of the enhanced unified and the double-sphere model: the
+//! projection from a unit sphere (or an ellipsoid that is stretched to one), α of the way to its
+//! centre.
 
 /// The share w at which the radius of `p = (x, y)/(α d + (1 − α) z)` stops rising, at `z = −w d`:
 /// `α/(1 − α)` for α ≤ ½ and `(1 − α)/α` above.

@@ -249,8 +249,9 @@ fn is_formula(text: &str) -> bool {
     text.starts_with(['=', '+', '-', '@', '\t', '\r'])
 }
 
-/// The name of a frame as a cell. One with blanks at an end, which readers of tables take away, gets
-/// an apostrophe at both, and so does one that has them already; [`name_from_cell`] takes them away.
+/// The name of a frame as a cell. One with blanks at an end, which readers of tables take away,
+/// gets an apostrophe at both, and so does one that has them already; [`name_from_cell`] takes them
+/// away.
 fn name_to_cell(name: &str) -> Cow<'_, str> {
     if has_outer_blanks(name) {
         Cow::Owned(format!("'{name}'"))

@@ -30,9 +30,9 @@ pub struct Jitter {
     pub translation_sigma_m: [f64; 3],
 }
 
-/// Largest volume in which a frame is searched for, cubic degrees (1-σ), as for 20° about each axis:
-/// at 320 × 240 px, a frame takes two to three seconds of a processor at this width, and its time
-/// grows with the volume.
+/// Largest volume in which a frame is searched for, cubic degrees (1-σ), as for 20° about each
+/// axis: at 320 × 240 px, a frame takes two to three seconds of a processor at this width, and its
+/// time grows with the volume.
 pub const MAX_SEARCH_VOLUME_DEG3: f64 = 8000.0;
 
 /// Fraction of the lateral offset, and of the tilt against the axis, that a random walk loses at

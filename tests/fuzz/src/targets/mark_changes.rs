@@ -1,5 +1,5 @@
-//! Marks that are put and removed while writing fails: two bytes for a change, the first says which,
-//! and whether its files can be written, the second what the note is.
+//! Marks that are put and removed while writing fails: two bytes for a change, the first says
+//! which, and whether its files can be written, the second what the note is.
 
 use std::path::Path;
 use tunnelstitch::inspect::{MARKS_CSV, MARKS_GEOJSON, Mark, Marks};
@@ -10,7 +10,8 @@ const IDS: [&str; 4] = ["a", "b", "c-1", "d"];
 fn mark(id: &str, note: u8) -> Mark {
     let mut mark: Mark = serde_json::from_str(
         r#"{"type": "Feature", "id": "a", "geometry": {"type": "Point", "coordinates": [1.5, 2.0]},
-        "properties": {"class": "BAB", "severity": 3, "note": "", "chainage_m": 2.0, "clock": "4:30",
+        "properties": {"class": "BAB", "severity": 3, "note": "", "chainage_m": 2.0,
+        "clock": "4:30",
         "theta_deg": 135.0, "x_m": 1.0, "y_m": 2.0, "z_m": 0.0, "layer": "truth", "created": ""}}"#,
     )
     .unwrap();

@@ -1,4 +1,5 @@
-//! What the fuzzer, and a test of the program with damaged seeds, calls with bytes of others.
+//! Functions that the fuzzer, and a test of the program with damaged seeds, call with bytes of
+//! others.
 
 pub mod calibration;
 pub mod centreline;

@@ -1,5 +1,5 @@
-//! Whole runs of `refine` and of `stitch` on files of poses and of a camera with a fuzzer's numbers:
-//! nine bytes for a number to change, its place and its bits.
+//! Whole runs of `refine` and of `stitch` on files of poses and of a camera with a fuzzer's
+//! numbers: nine bytes for a number to change, its place and its bits.
 
 use super::super::{file, small_survey};
 use std::sync::Arc;

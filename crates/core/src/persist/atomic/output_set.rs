@@ -21,26 +21,18 @@ pub struct OutputSet {
     replacements: Vec<Replacement>,
 }
 
-/// What takes the place of a file or a folder.
+/// The new content of a file or a folder.
 struct Replacement {
     target: PathBuf,
     new: New,
 }
 
-/// The new content of a name.
+/// A new content.
 enum New {
     File(TemporaryFile),
     Folder(TemporaryFolder),
     /// None; the old one goes into the folder.
     Nothing(TemporaryFolder),
-}
-
-/// Name of the new content in a temporary folder, and of the old one after the exchange.
-const CONTENT: &str = "content";
-
-/// The place of the new content in a temporary folder.
-pub(super) fn content_of(temporary: &TemporaryFolder) -> PathBuf {
-    temporary.folder.path().join(CONTENT)
 }
 
 impl OutputSet {
@@ -132,12 +124,24 @@ impl OutputSet {
     }
 }
 
+impl StagedFolder {
+    /// Renames the folder to its final name; a folder of that name is replaced.
+    ///
+    /// # Errors
+    /// An error of the operating system.
+    pub fn finish(self) -> Result<(), WriteError> {
+        let mut set = OutputSet::default();
+        set.folder(self)?;
+        set.commit()
+    }
+}
+
 impl Replacement {
     /// Place of the new content, and of the old one after the exchange.
     fn place(&self) -> PathBuf {
         match &self.new {
             New::File(file) => file.path.to_path_buf(),
-            New::Folder(folder) | New::Nothing(folder) => content_of(folder),
+            New::Folder(folder) | New::Nothing(folder) => folder.content(),
         }
     }
 

@@ -3,7 +3,6 @@
 use super::durable;
 use super::error::WriteError;
 use super::file::create_folder;
-use super::output_set::{OutputSet, content_of};
 use super::parent::parent_folder;
 use super::temporary::{self, TemporaryFolder};
 use std::path::{Path, PathBuf};
@@ -12,7 +11,7 @@ use std::path::{Path, PathBuf};
 pub struct StagedFolder {
     target: PathBuf,
     folder: PathBuf,
-    /// What holds the folder; None if it is kept in any case.
+    /// The temporary folder that holds it; None if it is kept in any case.
     temporary: Option<TemporaryFolder>,
 }
 
@@ -26,7 +25,7 @@ impl StagedFolder {
         check_replaceable(target)?;
         create_folder(parent_folder(target))?;
         let temporary = temporary_beside(target)?;
-        let folder = content_of(&temporary);
+        let folder = temporary.content();
         create_folder(&folder)?;
         Ok(Self {
             target: target.to_owned(),
@@ -54,16 +53,6 @@ impl StagedFolder {
         &self.folder
     }
 
-    /// Renames the folder to its final name; a folder of that name is replaced.
-    ///
-    /// # Errors
-    /// An error of the operating system.
-    pub fn finish(self) -> Result<(), WriteError> {
-        let mut set = OutputSet::default();
-        set.folder(self)?;
-        set.commit()
-    }
-
     /// The target and its content, synchronised to disk, in a temporary folder.
     pub(super) fn into_complete(self) -> Result<(PathBuf, TemporaryFolder), WriteError> {
         let fail = |source| WriteError::new(&self.target, source);
@@ -73,7 +62,7 @@ impl StagedFolder {
             // Under its own name, the old content would be taken for the new after the exchange.
             None => {
                 let temporary = temporary_beside(&self.target)?;
-                std::fs::rename(&self.folder, content_of(&temporary)).map_err(fail)?;
+                std::fs::rename(&self.folder, temporary.content()).map_err(fail)?;
                 temporary
             }
         };
@@ -133,7 +122,7 @@ impl ScratchFolder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::persist::atomic::file::write_text;
+    use crate::persist::atomic::write::write_text;
 
     #[test]
     fn a_staged_folder_appears_whole_or_not_at_all() {

@@ -12,8 +12,8 @@ use tempfile::{TempDir, TempPath};
 /// Prefix of temporary names.
 const PREFIX: &str = ".tunnelstitch-";
 
-/// End of the temporary name of a result that is being replaced in several steps. It is never removed
-/// as abandoned: it may be the only copy.
+/// End of the temporary name of a result that is being replaced in several steps. It is never
+/// removed as abandoned: it may be the only copy.
 pub(super) const REPLACED_SUFFIX: &str = ".replaced";
 
 /// Temporary paths in use.
@@ -118,6 +118,16 @@ pub(super) struct TemporaryFolder {
     pub folder: TempDir,
     _listed: Listed,
     _lock: Option<File>,
+}
+
+/// Name of the new content in a temporary folder, and of the old one after an exchange.
+const CONTENT: &str = "content";
+
+impl TemporaryFolder {
+    /// The place of the new content, and of the old one after an exchange.
+    pub fn content(&self) -> PathBuf {
+        self.folder.path().join(CONTENT)
+    }
 }
 
 /// Creates a temporary folder in `parent`.
