@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Sound files for the fuzzer to begin with, most of them written by the program itself: tests/fuzz/corpus/TARGET/.
+# Sound files for the fuzzer to begin with, most of them written by the program itself: tests/fuzz/seeds/TARGET/.
 # A zero byte before a file is the choice that some targets take from the first.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-corpus=$PWD/tests/fuzz/corpus
+corpus=$PWD/tests/fuzz/seeds
 work=$(mktemp -d)
 trap 'rm -r "$work"' EXIT
 cargo build --release --quiet
@@ -83,7 +83,6 @@ for ending in png jpg tif; do
     program stitch "$small" --px-per-metre 5 --out "$work/wall.$ending"
     seed pictures $ending <"$work/wall.$ending"
 done
-seed pictures frame <$blender/frames/000000.jpg
 
 seed poses euroc 0 <<'END'
 #timestamp [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z
@@ -155,6 +154,10 @@ request 'GET /TOKEN/api/frames/1' | seed requests frame
 request 'GET /TOKEN/api/sightings?layer=initial&s=1.5&h=0.1' | seed requests sightings
 { request 'PUT /TOKEN/api/marks/a-1' "Content-Length: ${#mark}"$'\r\n'; printf %s "$mark"; } | seed requests put
 request 'DELETE /TOKEN/api/marks/a-1' | seed requests delete
+printf '\000A\001B\004C\010D\021E\002F\014G' | seed mark_changes all
+printf 'frames/=a,"b"\n.png' | seed names odd
+printf '000001.png' | seed names plain
+printf '\000\173\024\256\107\341\172\204\077' | seed runs shift
 seed video probed <<'END'
 {"packets": [{"pts": 0, "flags": "K_"}, {"pts": 60, "flags": "__"}, {"pts": 20, "flags": "_D"}], "streams": [{"width": 64,
  "height": 48, "pix_fmt": "yuv420p", "time_base": "1/600", "field_order": "progressive", "side_data_list": [{"rotation": -90}]}]}
