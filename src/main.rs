@@ -5,16 +5,27 @@ use std::process::ExitCode;
 use std::sync::{Arc, atomic::AtomicBool};
 use tunnelstitch::cli::{Failure, print_error};
 
+/// In the text of a panic: a `TryReserveError` of the standard library for memory that is not
+/// there.
+const NO_MEMORY: &str = "AllocError";
+
 fn main() -> ExitCode {
-    // A panic in any thread is a bug and ends the program with the exit code of bugs.
+    // A panic in any thread is a bug and ends the program with the exit code of bugs; but a library
+    // that expects memory where there is none panics, too.
     std::panic::set_hook(Box::new(|panic| {
         tunnelstitch::persist::remove_unfinished();
-        print_error(&format!(
-            "bug in tunnelstitch {}: {panic}\nplease report it with the command line and, if you \
-             can, the survey",
-            env!("CARGO_PKG_VERSION")
-        ));
-        std::process::exit(1);
+        let what = panic.to_string();
+        let failure = if what.contains(NO_MEMORY) {
+            Failure::temporary(format!("error: memory has ended: {what}"))
+        } else {
+            Failure::bug(format!(
+                "bug in tunnelstitch {}: {what}\nplease report it with the command line and, if \
+                 you can, the survey",
+                env!("CARGO_PKG_VERSION")
+            ))
+        };
+        print_error(&failure.message);
+        std::process::exit(failure.code.into());
     }));
     block_file_size_signal();
     exit_without_memory();
