@@ -11,8 +11,9 @@ mod fuzz;
 const COPIES: usize = 500;
 const FEW_COPIES: usize = 40;
 
-/// Targets that refine or serve, and one that needs another ffprobe.
+/// Targets of which a call takes long.
 const SLOW: [&str; 2] = ["runs", "gyro"];
+/// A target that needs another ffprobe, which the whole process would get.
 const ELSEWHERE: &str = "video";
 
 /// A copy with some bytes changed, parts removed and repeated, or a part of another seed.

@@ -14,8 +14,8 @@ use crate::persist::provenance::Input;
 use crate::progress::Progress;
 use crate::refine::read_covariances;
 use crate::render::{
-    Budget, CheckpointedFiles, DeformationAt, FrameExposure, Gap, Layout, MaskedAt, RenderOptions,
-    Stitch, StitchOptions, WallProperties,
+    Budget, CheckpointedFiles, DeformationAt, FrameExposure, Gap, Layout, MaskedAt, PanoramaFiles,
+    Plan, RenderOptions, Stitch, StitchOptions, WallProperties,
 };
 use crate::surface::WallPoint;
 use crate::survey::{MaskedWall, Survey};
@@ -91,7 +91,6 @@ struct StitchRun<'a> {
     deformation: Option<DeviationMap>,
     masked: Option<MaskedWall>,
     record: &'a RunRecord,
-    inputs: Vec<Input>,
     terminal: &'a Terminal,
 }
 
@@ -122,7 +121,6 @@ pub fn run(
         },
         masked: read_masked_wall(arguments, &survey)?,
         record,
-        inputs: record::hash_survey(&survey, arguments.poses.file())?,
         terminal,
     };
     let mut stitch = Stitch::new(
@@ -137,7 +135,8 @@ pub fn run(
     let files = output.options();
     let budget = stitch.budget(files.pending_bytes(&canvas, format, run.layout))?;
     run.announce(&stitch, &budget);
-    let origin = resume::origin(&survey, &run.options_of_result(), run.inputs.clone())?;
+    let inputs = record::hash_survey(&survey, arguments.poses.file())?;
+    let origin = resume::origin(&survey, &run.options_of_result(), inputs.clone())?;
     let say = |text: &str| run.say(text);
     arguments
         .resume
@@ -146,7 +145,7 @@ pub fn run(
             for also in [&files.dzi, &files.maps].into_iter().flatten() {
                 checkpoint.lock_also(also)?;
             }
-            run.draw(&mut stitch, budget, checkpoint)
+            run.draw(&mut stitch, budget, checkpoint, &inputs)
         })
 }
 
@@ -199,6 +198,7 @@ impl StitchRun<'_> {
         stitch: &mut Stitch,
         budget: Budget,
         checkpoint: &mut Checkpoint,
+        inputs: &[Input],
     ) -> Result<(), Failure> {
         let terminal = self.terminal;
         let (canvas, format) = (*stitch.canvas(), stitch.frames().format());
@@ -236,23 +236,10 @@ impl StitchRun<'_> {
         }
         let gaps = files.gaps(self.survey.surface.as_ref());
         terminal.start("writing", 1);
-        let camera = &self.survey.camera;
-        let deformation = self.deformation.as_ref();
-        let deformation_at = deformation.map(|map| |wall: WallPoint| map.at_mm(wall));
-        let masked = self.masked.as_ref();
-        let masked_at = masked.map(|masked| {
-            |wall: WallPoint| masked.share_at(wall).map_or(f32::NAN, |share| share as f32)
-        });
-        let wall = WallProperties {
-            deformation: deformation_at.as_ref().map(|at| at as &DeformationAt),
-            masked: masked_at.as_ref().map(|at| at as &MaskedAt),
-        };
-        let covariances = self.covariances.as_deref();
-        let mut outputs = OutputSet::default();
-        let written = files.finish(&mut outputs, &plan, &gaps, camera, covariances, wall);
+        let staged = self.stage_files(files, &plan, &gaps);
         terminal.finish();
-        written?;
-        (self.record).add_to(&mut outputs, &output.run_file(), &self.inputs)?;
+        let mut outputs = staged?;
+        (self.record).add_to(&mut outputs, &output.run_file(), inputs)?;
         outputs.commit()?;
         let [width, height] = self.layout.size(&canvas);
         let report = StitchReport {
@@ -275,6 +262,36 @@ impl StitchRun<'_> {
             print_summary(&report, terminal);
             Ok(())
         }
+    }
+
+    /// Completes the files of the panorama; they have not their names yet.
+    fn stage_files(
+        &self,
+        files: PanoramaFiles,
+        plan: &Plan,
+        gaps: &[Gap],
+    ) -> Result<OutputSet, Failure> {
+        let deformation = self.deformation.as_ref();
+        let deformation_at = deformation.map(|map| |wall: WallPoint| map.at_mm(wall));
+        let masked = self.masked.as_ref();
+        let masked_at = masked.map(|masked| {
+            |wall: WallPoint| masked.share_at(wall).map_or(f32::NAN, |share| share as f32)
+        });
+        let wall = WallProperties {
+            deformation: deformation_at.as_ref().map(|at| at as &DeformationAt),
+            masked: masked_at.as_ref().map(|at| at as &MaskedAt),
+        };
+        let covariances = self.covariances.as_deref();
+        let mut outputs = OutputSet::default();
+        files.finish(
+            &mut outputs,
+            plan,
+            gaps,
+            &self.survey.camera,
+            covariances,
+            wall,
+        )?;
+        Ok(outputs)
     }
 }
 
