@@ -9,6 +9,7 @@ use crate::files::read_text;
 use crate::inspect::error::InspectError;
 use crate::inspect::mark::{Mark, MarkVersions};
 use crate::persist::atomic::OutputSet;
+use crate::persist::file_lock::FileLock;
 use crate::trajectory::csv::to_cell;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -244,12 +245,9 @@ fn read_marks(path: &Path) -> Result<Collection, InspectError> {
     }
 }
 
-/// Keeps other programs from changing the marks of a folder until the file is dropped; None where
-/// folders have no locks.
-fn lock_folder(folder: &Path) -> Option<File> {
-    let file = File::open(folder).ok()?;
-    file.lock().ok()?;
-    Some(file)
+/// Keeps other programs from changing the marks of a folder; None where folders have no locks.
+fn lock_folder(folder: &Path) -> Option<FileLock> {
+    FileLock::wait(File::open(folder).ok()?).ok()
 }
 
 #[cfg(test)]

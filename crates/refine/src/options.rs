@@ -57,11 +57,6 @@ pub struct RefineOptions {
     /// Share of the information that the global solves before the last use, below the level where
     /// tracking ends: they compare the most informative tiles, 0 to 1.
     pub intermediate_information: f64,
-    /// Search each frame over the whole prior by correlation before it is refined; otherwise it
-    /// starts at the predicted pose.
-    pub search: bool,
-    /// Solve sliding windows while tracking.
-    pub windows: bool,
     /// Solve once more, for the wall at a third of a pixel jointly with the poses, instead of
     /// interpolating between the frames' pixels: on walls with sharp edges errors are about a third
     /// smaller, in ten to twenty times the time. The solve is skipped where the wall is too smooth
@@ -97,8 +92,6 @@ impl Default for RefineOptions {
             final_density: 2.0,
             outlier_mask_density: None,
             intermediate_information: 0.5,
-            search: true,
-            windows: true,
             joint: false,
             max_sigma_px: 0.25,
             false_alarm_rate: 1e-3,

@@ -35,11 +35,12 @@
 //! ```
 
 use super::atomic::{self, WriteError};
+use super::file_lock::FileLock;
 use super::provenance::Input;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
-use std::fs::{File, TryLockError};
+use std::fs::TryLockError;
 use std::io::{self, BufWriter, ErrorKind, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -153,9 +154,9 @@ pub struct Checkpoint {
     wait: Duration,
     /// Time at which the current save became due.
     due: Option<Instant>,
-    _lock: File,
+    _lock: Option<FileLock>,
     /// Folders and locks of other outputs.
-    locks: Vec<(PathBuf, File)>,
+    locks: Vec<(PathBuf, Option<FileLock>)>,
 }
 
 impl Checkpoint {
@@ -400,8 +401,8 @@ pub fn folder_of(result: &Path) -> PathBuf {
     name.into()
 }
 
-/// Locks the folder until the file is dropped or the process ends.
-fn lock(folder: &Path) -> Result<File, CheckpointError> {
+/// Locks the folder; None where the file system has no locks: the run goes on without.
+fn lock(folder: &Path) -> Result<Option<FileLock>, CheckpointError> {
     // Its files are removed, so it must not lead elsewhere.
     if folder.is_symlink() {
         let what = io::Error::other("it is a symbolic link, which is not followed; remove it");
@@ -410,13 +411,12 @@ fn lock(folder: &Path) -> Result<File, CheckpointError> {
     let path = folder.join(LOCK_FILE);
     let fail = |source| WriteError::new(&path, source);
     let file = open_without_links(&path).map_err(fail)?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
+    match FileLock::take(file) {
+        Ok(lock) => Ok(Some(lock)),
         Err(TryLockError::WouldBlock) => Err(CheckpointError::Busy {
             folder: folder.to_owned(),
         }),
-        // Some file systems have no locks; the run continues without.
-        Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => Ok(file),
+        Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => Ok(None),
         Err(TryLockError::Error(error)) => Err(fail(error).into()),
     }
 }

@@ -1,14 +1,16 @@
-//! Results that survive a crash: files that are complete or absent, checkpoints of long runs, and
-//! the provenance of a result.
+//! Results that survive a crash: files that are complete or absent, checkpoints of long runs,
+//! locks, and the provenance of a result.
 //!
 //! | subject | file |
 //! | --- | --- |
 //! | files and folders written under a temporary name, then renamed | [`atomic`] |
 //! | states of a long run, to resume from | [`checkpoint`] |
+//! | locks against other programs | [`file_lock`] |
 //! | what a result was made from and with | [`provenance`] |
 
 pub mod atomic;
 pub mod checkpoint;
+pub mod file_lock;
 pub mod provenance;
 
 pub use atomic::remove_unfinished;

@@ -6,9 +6,13 @@ use crate::wall_error::{FrameOffsets, frame_offsets, mean_arc};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::{Surface, shortest_arc};
 use tunnelstitch_geometry::trajectory::Pose;
+use tunnelstitch_refine::{FrameFlag, FrameReport};
 
 /// Root mean square wall error below which a frame is good, pixels.
 pub const GOOD_PX: f64 = 0.5;
+
+/// Deviation of a photometric frame beyond which its stated σ is wrong, σ.
+const MAX_DEVIATION_SIGMA: f64 = 3.5;
 
 /// Wall errors of frames with the gauge fixed by the majority of them.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +27,17 @@ impl MajorityError {
     /// Number of frames below [`GOOD_PX`].
     pub fn good_count(&self) -> usize {
         self.frame_rms_px.iter().filter(|px| **px < GOOD_PX).count()
+    }
+
+    /// Number of photometric frames that are neither good nor within 3.5 of their stated σ:
+    /// undetected failures.
+    pub fn false_successes(&self, frames: &[FrameReport]) -> usize {
+        // NaN does not count as good.
+        let is_good = |px: f64, sigma_px: f64| px < GOOD_PX.max(MAX_DEVIATION_SIGMA * sigma_px);
+        (frames.iter().zip(&self.frame_rms_px))
+            .filter(|(frame, _)| frame.flag == FrameFlag::Photometric)
+            .filter(|(frame, px)| !is_good(**px, frame.sigma.wall_px))
+            .count()
     }
 
     /// Error of the worst frame, pixels.

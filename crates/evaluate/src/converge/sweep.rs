@@ -2,7 +2,7 @@
 
 use crate::converge::error::ConvergeError;
 use crate::converge::feasible_survey::draw_survey;
-use crate::converge::majority_error::{GOOD_PX, majority_error};
+use crate::converge::majority_error::majority_error;
 use crate::converge::options::ConvergeOptions;
 use crate::converge::run_log::RunLog;
 use crate::converge::run_record::RunRecord;
@@ -158,9 +158,6 @@ fn simulate_and_refine(
     }
 }
 
-/// Deviation of a photometric frame beyond which its stated σ is wrong, σ.
-const MAX_DEVIATION_SIGMA: f64 = 3.5;
-
 /// Records the accuracy of the refined poses and the reliability of their flags.
 ///
 /// # Errors
@@ -185,12 +182,6 @@ fn record_accuracy(
         .iter()
         .filter(|frame| !is_photometric(frame.flag))
         .count();
-    // NaN does not count as good.
-    let is_good = |px: f64, sigma_px: f64| px < GOOD_PX.max(MAX_DEVIATION_SIGMA * sigma_px);
-    record.false_successes = frames
-        .iter()
-        .zip(&error.frame_rms_px)
-        .filter(|(frame, px)| is_photometric(frame.flag) && !is_good(**px, frame.sigma.wall_px))
-        .count();
+    record.false_successes = error.false_successes(frames);
     Ok(())
 }

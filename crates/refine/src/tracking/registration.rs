@@ -112,11 +112,9 @@ pub fn register_frame(
     let registration =
         Registration::new(context, options, frame, predicted, neighbours, distance_m)?;
     effort.grant();
-    let hypotheses = registration.find_hypotheses(options);
+    let hypotheses = registration.search(&predicted.pose, registration.sigma_rad, MAX_HYPOTHESES);
     let mut candidates = registration.refine_hypotheses(&hypotheses, effort)?;
-    if options.search {
-        registration.search_closer(&mut candidates, effort)?;
-    }
+    registration.search_closer(&mut candidates, effort)?;
     sort_candidates(&mut candidates);
     let camera = context.camera.at_level(registration.search_level);
     let pixel_size =
@@ -194,20 +192,6 @@ impl<'r> Registration<'r> {
             mosaic,
             unwrapped,
         })
-    }
-
-    /// The hypotheses of the correlation search, or the prediction alone where there is no search.
-    fn find_hypotheses(&self, options: &RefineOptions) -> Vec<Hypothesis> {
-        let pose = self.predicted.pose;
-        if options.search {
-            self.search(&pose, self.sigma_rad, MAX_HYPOTHESES)
-        } else {
-            vec![Hypothesis {
-                pose,
-                score: 0.0,
-                attainable_score: 0.0,
-            }]
-        }
     }
 
     /// Searches around a pose; see [`search_poses`].

@@ -120,7 +120,7 @@ impl Tracking {
         let closes_turn = first < self.earliest_overlap;
         self.earliest_overlap = first;
         let drifted = closes_turn || !is_reliable;
-        if k > 0 && options.windows {
+        if k > 0 {
             if drifted || k.is_multiple_of(options.window_stride) || self.is_complete() {
                 solve_sliding_window(context, options, first, drifted, &mut self.states)?;
             }
