@@ -22,16 +22,18 @@ pub struct ExportFiles<'a> {
     pub tiles: Option<&'a Path>,
 }
 
-/// Draws the panorama of `poses` and writes it as textured mesh into `files`; returns its canvas.
+/// Draws the panorama of `poses` as textured mesh in `files`, which are added to a set of outputs;
+/// returns its canvas.
 ///
 /// # Errors
 /// A frame that cannot be decoded, too little memory, too much wall for one file, and whatever the
 /// system says.
-pub fn export_wall(
+pub fn stage_wall(
     survey: &Survey,
     poses: &[Pose],
     options: &TextureOptions,
     files: ExportFiles,
+    outputs: &mut OutputSet,
     progress: &dyn Progress,
 ) -> Result<Canvas, InspectError> {
     let surface = survey.surface.as_ref();
@@ -59,29 +61,27 @@ pub fn export_wall(
     let settled = stitch.settle(&budget, progress)?;
     let (plan, frames) = stitch.plan(settled);
     plan.draw(frames, budget.room, &mut targets, progress)?;
-    let mut outputs = OutputSet::default();
     if let Some(single) = single {
-        single.finish(&mut outputs)?;
+        single.finish(outputs)?;
     }
     if let Some(tiles) = tiles {
-        tiles.finish(&mut outputs, &canvas)?;
+        tiles.finish(outputs, &canvas)?;
     }
-    outputs.commit()?;
     Ok(canvas)
 }
 
-/// Writes the page with all layers into `folder`, which appears complete or not at all. Marks that
-/// are kept in an earlier page there stay.
+/// Writes the page with all layers as `folder`, which is added to a set of outputs. Marks that are
+/// kept in an earlier page there stay.
 ///
 /// # Errors
 /// A frame that cannot be decoded, a program built without its viewer, and whatever the system
 /// says.
-pub fn export_page(
+pub fn stage_page(
     survey: &Survey,
     layers: &[PosedLayer],
     options: &TextureOptions,
     twelve_at_deg: f64,
-    folder: &Path,
+    (folder, outputs): (&Path, &mut OutputSet),
     progress: &dyn Progress,
 ) -> Result<(), InspectError> {
     let staged = StagedFolder::begin(folder)?;
@@ -95,5 +95,5 @@ pub fn export_page(
                 .map_err(|source| WriteError::new(&old, source))?;
         }
     }
-    Ok(staged.finish()?)
+    Ok(outputs.folder(staged)?)
 }

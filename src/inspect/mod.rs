@@ -51,7 +51,7 @@ mod viewer;
 
 pub use deformation_layer::DEFORMATION_LAYER;
 pub use error::InspectError;
-pub use export::{ExportFiles, export_page, export_wall};
+pub use export::{ExportFiles, stage_page, stage_wall};
 pub use glb_target::GlbTarget;
 pub use layer_values::LayerValues;
 pub use layers::{PosedLayer, TextureOptions, draw_layers, pose_source_frames};

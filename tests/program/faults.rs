@@ -1,9 +1,12 @@
 //! Faults of the system at every call that opens or writes, and kills there, by `strace`: what was
 //! there before stays or is replaced as a whole, and the same command ends with the same bytes.
+//! Marks that `view` has acknowledged are kept.
 #![cfg(target_os = "linux")]
 
 use crate::support::outputs::{Outputs, files, outputs};
-use crate::support::{first_frames, missing, succeed, text};
+use crate::support::server::{JSON, Running, mark, small_site};
+use crate::support::{first_frames, missing, npm, succeed, text};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -19,6 +22,17 @@ const CALLS: [(&str, &str); 9] = [
     ("unlink", "EACCES"),
     ("flock", "EINTR"),
 ];
+
+/// The program under `strace` with an option.
+fn strace(trace: &Path, call: &str, option: &str) -> Command {
+    let mut strace = Command::new("strace");
+    strace
+        // The program is the child itself, so that it can be killed.
+        .args(["-D", "-f", "--seccomp-bpf", "-o", text(trace)])
+        .args(["-e", &format!("trace={call}"), "-e", option])
+        .arg(env!("CARGO_BIN_EXE_tunnelstitch"));
+    strace
+}
 
 /// A command over the results of an earlier one.
 struct Job<'a> {
@@ -62,10 +76,7 @@ impl<'a> Job<'a> {
             std::fs::write(path, content).unwrap();
         }
         let trace = self.traces.join("trace");
-        let output = Command::new("strace")
-            .args(["-f", "--seccomp-bpf", "-o", text(&trace)])
-            .args(["-e", &format!("trace={call}"), "-e", option])
-            .arg(env!("CARGO_BIN_EXE_tunnelstitch"))
+        let output = strace(&trace, call, option)
             .args(&self.arguments)
             .output()
             .unwrap();
@@ -212,10 +223,132 @@ fn refine(most: usize) -> [usize; 2] {
     job.endure(most)
 }
 
+/// Faults in `export` of a mesh or its tiles, over those of other poses.
+fn export(most: usize) -> [usize; 2] {
+    let survey = first_frames(2);
+    let folder = survey.path().join("out");
+    let (glb, tiles) = (folder.join("wall.glb"), folder.join("tiles"));
+    let export = |poses, kind, out| {
+        let poses = ["export", text(survey.path()), "--poses", poses];
+        [&poses[..], &["--px-per-metre", "10", "--quiet", kind, out]].concat()
+    };
+    let traces = tempfile::tempdir().unwrap();
+    let kinds = [("--glb", text(&glb)), ("--3dtiles", text(&tiles))];
+    let done = kinds.map(|(kind, out)| {
+        let arguments = export("truth", kind, out);
+        Job::new(
+            &export("initial", kind, out),
+            arguments,
+            folder.clone(),
+            traces.path(),
+        )
+        .endure(most)
+    });
+    [0, 1].map(|k| done[0][k] + done[1][k])
+}
+
+/// Changes of marks that a server is asked for: identifier, and mark or none.
+fn changes() -> [(&'static str, Option<String>); 4] {
+    [
+        ("a", Some(mark("a"))),
+        ("b", Some(mark("b"))),
+        ("a", Some(mark("a").replace("4:30", "7:15"))),
+        ("b", None),
+    ]
+}
+
+/// Marks by their identifier, as a server tells them; None if it does not.
+fn marks_of(server: &Running) -> Option<BTreeMap<String, serde_json::Value>> {
+    let (status, said) = server.ask("GET /api/marks", "", "");
+    let mut marks: serde_json::Value = (status == 200)
+        .then(|| serde_json::from_str(&said))?
+        .unwrap();
+    let marks = marks["features"].as_array_mut().unwrap();
+    let named = marks.iter_mut().map(serde_json::Value::take);
+    Some(
+        named
+            .map(|mark| (mark["id"].as_str().unwrap().to_owned(), mark))
+            .collect(),
+    )
+}
+
+/// Asks for all changes; for each mark its clock position, of those that may now be kept: the last
+/// acknowledged one and those after it.
+fn change(server: &Running) -> BTreeMap<&'static str, Vec<Option<String>>> {
+    let mut possible = BTreeMap::from([("a", vec![None]), ("b", vec![None])]);
+    for (id, mark) in changes() {
+        let status = match &mark {
+            Some(mark) => server.ask(&format!("PUT /api/marks/{id}"), JSON, mark).0,
+            None => server.ask(&format!("DELETE /api/marks/{id}"), JSON, "").0,
+        };
+        let clock = mark.map(|mark| {
+            if mark.contains("7:15") {
+                "7:15"
+            } else {
+                "4:30"
+            }
+            .to_owned()
+        });
+        let kept = possible.get_mut(id).unwrap();
+        if status == 200 {
+            kept.clear();
+        }
+        kept.push(clock);
+    }
+    possible
+}
+
+/// Faults and kills in a server that is asked to change marks, at no more than `most` calls of each
+/// kind in every thread; their number.
+fn view(most: usize) -> [usize; 2] {
+    let dir = tempfile::tempdir().unwrap();
+    let site = small_site(dir.path());
+    let trace = dir.path().join("trace");
+    let mut done = [0; 2];
+    for (call, error) in CALLS {
+        for nth in 1..=most {
+            let kinds = [format!("error={error}"), "signal=KILL".to_owned()];
+            for (done, kind) in done.iter_mut().zip(kinds) {
+                let option = format!("inject={call}:{kind}:when={nth}");
+                for name in ["marks.geojson", "marks.csv"] {
+                    let _ = std::fs::remove_file(site.join(name));
+                }
+                let program = strace(&trace, call, &option);
+                let possible = Running::run(program, &[text(&site)]).map(|server| change(&server));
+                let again = Running::start(&[text(&site)]);
+                let kept = marks_of(&again).unwrap();
+                for (id, clocks) in possible.iter().flatten() {
+                    let clock = kept
+                        .get(*id)
+                        .map(|mark| mark["properties"]["clock"].as_str().unwrap());
+                    let is_possible = clocks.iter().any(|one| one.as_deref() == clock);
+                    assert!(is_possible, "{option}: {id} has {clock:?} of {clocks:?}");
+                }
+                assert!(
+                    change(&again).values().all(|clocks| clocks.len() == 1),
+                    "{option}"
+                );
+                let names = marks_of(&again).unwrap().into_keys().collect::<Vec<_>>();
+                assert_eq!(names, ["a"], "{option}");
+                *done += 1;
+            }
+        }
+    }
+    done
+}
+
 #[test]
 fn some_faults_lose_nothing() {
     if can_trace() {
         stitch(3);
+        export(1);
+    }
+}
+
+#[test]
+fn acknowledged_marks_survive_faults_and_kills() {
+    if can_trace() && !npm::is_viewer_missing() {
+        view(2);
     }
 }
 
@@ -223,8 +356,11 @@ fn some_faults_lose_nothing() {
 #[ignore = "minutes: a fault and a kill at every call"]
 fn no_fault_loses_anything() {
     if can_trace() {
-        let done = [stitch(usize::MAX), refine(usize::MAX)];
-        println!("faults and kills of stitch and of refine: {done:?}");
+        let done = [stitch, refine, export].map(|endure| endure(usize::MAX));
+        println!("faults and kills of stitch, of refine and of export: {done:?}");
         assert!(done.iter().map(|[faults, _]| faults).sum::<usize>() >= 200);
+    }
+    if can_trace() && !npm::is_viewer_missing() {
+        println!("faults and kills of view: {:?}", view(12));
     }
 }

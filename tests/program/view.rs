@@ -1,96 +1,13 @@
 //! The viewer: its server from outside, and its page in a browser.
 
+use crate::support::server::{JSON, Running, mark, small_site};
 use crate::support::{blender_survey, chromium, fail, json, npm, succeed, text};
 use serde_json::Value;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::Write;
 use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tunnelstitch::inspect::{Marks, Viewer};
-
-/// A server, ended with this.
-struct Running {
-    child: Child,
-    port: u16,
-    token: String,
-}
-
-impl Running {
-    /// Starts `view` at a free port and waits until it listens.
-    fn start(arguments: &[&str]) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
-            .arg("view")
-            .args(arguments)
-            .args(["--port", "0"])
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the program starts");
-        let out = BufReader::new(child.stdout.take().expect("its output"));
-        let address = out
-            .lines()
-            .map_while(Result::ok)
-            .find_map(|line| line.strip_prefix("http://127.0.0.1:").map(str::to_owned))
-            .expect("an address");
-        let (port, rest) = address.split_once('/').expect("a path");
-        let token = rest.split('/').next().unwrap().to_owned();
-        assert_eq!(token.len(), 32, "{rest}");
-        let port = port.parse().expect("a port");
-        Self { child, port, token }
-    }
-
-    fn address(&self) -> String {
-        format!("http://127.0.0.1:{}/{}/", self.port, self.token)
-    }
-
-    /// Sends a request letter by letter as it is given; status and body of the answer.
-    fn send(&self, request: &str) -> (u16, String) {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("a connection");
-        stream.write_all(request.as_bytes()).expect("a request");
-        let mut answer = Vec::new();
-        stream.read_to_end(&mut answer).expect("an answer");
-        let answer = String::from_utf8_lossy(&answer).into_owned();
-        let status = answer
-            .split(' ')
-            .nth(1)
-            .and_then(|s| s.parse().ok())
-            .unwrap_or(0);
-        let body = answer
-            .split_once("\r\n\r\n")
-            .map_or(String::new(), |(_, body)| body.to_owned());
-        (status, body)
-    }
-
-    /// Sends a request with the correct host and token.
-    fn ask(&self, line: &str, headers: &str, body: &str) -> (u16, String) {
-        let length = body.len();
-        let line = line.replacen(" /", &format!(" /{}/", self.token), 1);
-        self.send(&format!(
-            "{line} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\
-             Content-Length: {length}\r\n{headers}\r\n{body}",
-            self.port
-        ))
-    }
-}
-
-impl Drop for Running {
-    /// Without a warning, as in a crash.
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-const JSON: &str = "Content-Type: application/json\r\n";
-
-fn mark(id: &str) -> String {
-    format!(
-        r#"{{"type":"Feature","id":"{id}",
-        "geometry":{{"type":"Point","coordinates":[1.5,2.0]}},
-        "properties":{{"class":"BAB","severity":3,"note":"","chainage_m":2.0,"clock":"4:30",
-        "theta_deg":135.0,"x_m":1.0,"y_m":2.0,"z_m":0.0,"layer":"truth","created":""}}}}"#
-    )
-}
 
 fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
@@ -244,23 +161,6 @@ fn the_server_answers_its_own_page_and_writes_nothing_but_marks() {
         message.contains("marks.geojson") && message.contains("move it away"),
         "{message}"
     );
-}
-
-/// A folder of the page that `export --web` has written.
-fn small_site(folder: &Path) -> std::path::PathBuf {
-    let site = folder.join("site");
-    let survey = blender_survey();
-    let export = [
-        "export",
-        text(&survey),
-        "--poses",
-        "truth",
-        "--layers",
-        "truth",
-    ];
-    let options = ["--px-per-metre", "10", "--web", text(&site), "--quiet"];
-    succeed(&[&export[..], &options].concat());
-    site
 }
 
 #[test]

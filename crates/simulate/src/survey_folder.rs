@@ -45,6 +45,22 @@ pub fn write_survey(
     overwrite: bool,
     progress: &dyn Progress,
 ) -> Result<SimulationRecord, SimulateError> {
+    let (simulated, folder) = stage_survey(options, out, overwrite, progress)?;
+    folder.finish()?;
+    Ok(simulated)
+}
+
+/// Writes a survey as [`write_survey`] does, but leaves it to the caller to give the folder its
+/// name.
+///
+/// # Errors
+/// [`SimulateError`].
+pub fn stage_survey(
+    options: &SimulateOptions,
+    out: &Path,
+    overwrite: bool,
+    progress: &dyn Progress,
+) -> Result<(SimulationRecord, StagedFolder), SimulateError> {
     let scene = Scene::new(options)?;
     check_output_folder(out, overwrite)?;
     let simulated = SimulationRecord {
@@ -63,8 +79,7 @@ pub fn write_survey(
     write_text_files(&scene, &simulated, folder.path()).map_err(final_name)?;
     write_masks(&scene, folder.path()).map_err(final_name)?;
     write_frames(&scene, &folder.path().join("frames"), progress).map_err(final_name)?;
-    folder.finish()?;
-    Ok(simulated)
+    Ok((simulated, folder))
 }
 
 /// Mask of the pixels that show the wall; only written if the rig's shaft is visible.

@@ -93,8 +93,10 @@ pub fn run(
             nerfstudio::format(keys, &survey.frame_paths_from(folder), &trajectory)
         }
         OutputFormat::Colmap => {
-            write_colmap(out, &camera()?, &names(), &trajectory)?;
-            record.write(&out.join(RUN_FILE), &inputs)?;
+            let mut outputs = OutputSet::default();
+            outputs.folder(stage_colmap(out, &camera()?, &names(), &trajectory)?)?;
+            record.add_to(&mut outputs, &out.join(RUN_FILE), &inputs)?;
+            outputs.commit()?;
             terminal.say(format!(
                 "wrote {} poses to {}",
                 trajectory.len(),
@@ -131,13 +133,13 @@ const MODEL_FILES: [&str; 3] = [
     colmap::POINTS_FILE,
 ];
 
-/// Writes a COLMAP model. It replaces an earlier model, but no folder with other files.
-fn write_colmap(
+/// Writes a COLMAP model that is to replace an earlier one, but no folder with other files.
+fn stage_colmap(
     out: &Path,
     camera: &ColmapCamera,
     names: &[String],
     trajectory: &[StampedPose],
-) -> Result<(), Failure> {
+) -> Result<StagedFolder, Failure> {
     if out.exists() {
         let entries = std::fs::read_dir(out).map_err(|error| WriteError::new(out, error))?;
         let is_of_model = |entry: std::io::Result<std::fs::DirEntry>| {
@@ -163,5 +165,5 @@ fn write_colmap(
     for (name, text) in MODEL_FILES.iter().zip(texts) {
         atomic::write_text(&staged.path().join(name), &text)?;
     }
-    Ok(staged.finish()?)
+    Ok(staged)
 }

@@ -5,7 +5,8 @@ use crate::cli::output::{
     Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, json, record,
 };
 use crate::files::printed;
-use crate::inspect::{ExportFiles, MANIFEST, TILESET, Viewer, export_page, export_wall};
+use crate::inspect::{ExportFiles, MANIFEST, TILESET, Viewer, stage_page, stage_wall};
+use crate::persist::atomic::OutputSet;
 use crate::render::Canvas;
 use crate::survey::Survey;
 use crate::trajectory::{Trajectory, poses_of};
@@ -86,22 +87,33 @@ pub fn run(
         glb: arguments.glb.as_deref(),
         tiles: arguments.tiles.as_deref(),
     };
+    let mut outputs = OutputSet::default();
     let canvas = if files.glb.is_some() || files.tiles.is_some() {
         let (poses, options) = (poses_of(&trajectory), arguments.textures.options());
-        Some(export_wall(&survey, &poses, &options, files, terminal)?)
+        Some(stage_wall(
+            &survey,
+            &poses,
+            &options,
+            files,
+            &mut outputs,
+            terminal,
+        )?)
     } else {
         None
     };
     let layers = match &arguments.web {
-        Some(folder) => write_page(arguments, folder, (survey, trajectory), terminal)?,
+        Some(folder) => {
+            let page = (folder.as_path(), &mut outputs);
+            add_page(arguments, page, (survey, trajectory), terminal)?
+        }
         None => Vec::new(),
     };
-    if let Some(glb) = &arguments.glb {
-        record.write(&record::path_beside(glb), &inputs)?;
+    let beside = arguments.glb.iter().map(|glb| record::path_beside(glb));
+    let folders = arguments.tiles.iter().chain(&arguments.web);
+    for path in beside.chain(folders.map(|folder| folder.join(RUN_FILE))) {
+        record.add_to(&mut outputs, &path, &inputs)?;
     }
-    for folder in arguments.tiles.iter().chain(&arguments.web) {
-        record.write(&folder.join(RUN_FILE), &inputs)?;
-    }
+    outputs.commit()?;
     let report = ExportReport {
         glb: files.glb,
         tiles: files.tiles,
@@ -176,10 +188,10 @@ fn check_replaceable(folder: &Path, file: &str) -> Result<(), Failure> {
     )))
 }
 
-/// Writes the page of --web; returns its layers.
-fn write_page(
+/// Adds the page of --web to a set of outputs; returns its layers.
+fn add_page(
     arguments: &ExportArguments,
-    folder: &Path,
+    page: (&Path, &mut OutputSet),
     opened: (Survey, Trajectory),
     terminal: &Terminal,
 ) -> Result<Vec<LayerName>, Failure> {
@@ -187,12 +199,12 @@ fn write_page(
     let (survey, selected) = layers.select(&arguments.survey, &arguments.poses, opened)?;
     let (names, posed): (Vec<_>, Vec<_>) = selected.into_iter().unzip();
     let options = arguments.textures.options();
-    export_page(
+    stage_page(
         &survey,
         &posed,
         &options,
         layers.twelve_at_deg,
-        folder,
+        page,
         terminal,
     )?;
     Ok(names)

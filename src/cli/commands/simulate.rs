@@ -7,6 +7,7 @@ use crate::cli::arguments::{
 };
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::files::printed;
+use crate::persist::atomic::OutputSet;
 use crate::simulate::{self, Illumination, SimulateOptions, Wall};
 use crate::survey::PriorSection;
 use crate::trajectory::JitterModel;
@@ -287,7 +288,8 @@ pub fn run(
         ));
     }
     let options = arguments.options()?;
-    let simulated = simulate::write_survey(&options, &arguments.out, arguments.force, terminal)?;
+    let out = &arguments.out;
+    let (simulated, folder) = simulate::stage_survey(&options, out, arguments.force, terminal)?;
     let inputs = [
         &arguments.camera,
         &arguments.texture,
@@ -295,7 +297,10 @@ pub fn run(
         &options.as_built.shape_file,
     ];
     let inputs = record::hash_files(inputs.into_iter().flatten().map(AsRef::as_ref))?;
-    record.write(&arguments.out.join(RUN_FILE), &inputs)?;
+    let mut outputs = OutputSet::default();
+    outputs.folder(folder)?;
+    record.add_to(&mut outputs, &out.join(RUN_FILE), &inputs)?;
+    outputs.commit()?;
     if arguments.json {
         return json::print(&simulated);
     }

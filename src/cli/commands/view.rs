@@ -1,7 +1,7 @@
 //! `tunnelstitch view`: shows the tunnel in the browser.
 
 use crate::cli::arguments::{LayerArguments, PosesArguments, TextureArguments};
-use crate::cli::output::{Failure, Terminal};
+use crate::cli::output::{Failure, Terminal, json};
 use crate::files::limits::MAX_REPORT_BYTES;
 use crate::files::{printed, read_text};
 use crate::inspect::{
@@ -61,7 +61,7 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
             source_frames: None,
             marks: Marks::open(&arguments.survey)?,
         };
-        return serve(served, arguments.port, terminal);
+        return serve(served, arguments.port);
     }
     let (survey, poses) = match refined_folder(&arguments.survey)? {
         Some(refined) if arguments.poses.file().is_none() => refined,
@@ -86,7 +86,7 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
         source_frames: Some(pose_source_frames(survey, layers)?),
         marks,
     };
-    serve(served, arguments.port, terminal)
+    serve(served, arguments.port)
 }
 
 /// Finds the survey and the poses of a folder that `refine` has written; `None` for other folders.
@@ -115,11 +115,11 @@ fn refined_folder(folder: &Path) -> Result<Option<(PathBuf, PosesArguments)>, Fa
     }
 }
 
-fn serve(served: ServerContent, port: u16, terminal: &Terminal) -> Result<(), Failure> {
+fn serve(served: ServerContent, port: u16) -> Result<(), Failure> {
     let folder: &Path = &served.folder.clone();
     let server = Server::listen(served, port)?;
-    // Programs wait for this line to learn the address.
-    terminal.say(format!("{} (Ctrl-C ends it)", server.address()));
+    // Nobody and no program can find the server without this line.
+    json::print_text(&format!("{} (Ctrl-C ends it)\n", server.address()))?;
     server.run();
     Err(Failure::bug(format!(
         "{}: the server has ended",

@@ -5,6 +5,7 @@ pub mod chromium;
 pub mod missing;
 pub mod npm;
 pub mod outputs;
+pub mod server;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

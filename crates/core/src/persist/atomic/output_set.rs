@@ -6,6 +6,7 @@ use super::exchange::exchange;
 use super::parent::parent_folder;
 use super::staged::StagedFolder;
 use super::temporary::{self, TemporaryFile, TemporaryFolder};
+use super::write::write;
 use super::{durable, file};
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -36,7 +37,7 @@ enum New {
 }
 
 impl OutputSet {
-    /// Adds the file `path`; `fill` writes its content.
+    /// Adds the file `path`, which may lie in a folder of the set; `fill` writes its content.
     ///
     /// # Errors
     /// An error of the operating system about the folder or writing.
@@ -45,9 +46,26 @@ impl OutputSet {
         path: &Path,
         fill: impl FnOnce(&mut BufWriter<ErrorKeeper<File>>) -> io::Result<()>,
     ) -> Result<(), WriteError> {
+        if let Some(place) = self.place_in_folder(path) {
+            let written = write(&place, fill);
+            written.map_err(|error| WriteError::new(path, error.source))?;
+            durable::sync_folder(parent_folder(&place));
+            return Ok(());
+        }
         let new = New::File(file::fill_temporary(path, fill)?);
         self.add(path, new);
         Ok(())
+    }
+
+    /// The place of a file in a new folder of the set; None if it lies in none.
+    fn place_in_folder(&self, path: &Path) -> Option<PathBuf> {
+        let folders = self.replacements.iter();
+        folders
+            .filter(|replacement| matches!(replacement.new, New::Folder(_)))
+            .find_map(|folder| {
+                let within = path.strip_prefix(&folder.target).ok()?;
+                Some(folder.place().join(within))
+            })
     }
 
     /// Adds a text file; see [`OutputSet::write`].
@@ -222,6 +240,22 @@ mod tests {
         let before = state(dir.path());
         fail(set(dir.path(), "new", &last));
         assert_eq!(state(dir.path()), before);
+    }
+
+    #[test]
+    fn a_file_in_a_folder_of_the_set_appears_with_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let record = dir.path().join("tiles").join("run.toml");
+        for commits in [false, true] {
+            let mut set = set(dir.path(), "new", dir.path());
+            set.write_text(&record, "how").unwrap();
+            if commits {
+                set.commit().unwrap();
+            }
+            assert_eq!(record.exists(), commits);
+        }
+        assert_eq!(names(record.parent().unwrap()), ["new", "run.toml"]);
+        assert_eq!(std::fs::read_to_string(&record).unwrap(), "how");
     }
 
     #[test]
