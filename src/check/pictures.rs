@@ -2,7 +2,7 @@
 
 use super::statistics::median_or_zero;
 use crate::files::printed;
-use crate::frames::{FrameFile, GreyImage, StoredFrame, noise_sigma};
+use crate::frames::{FrameFile, GreyImage, StoredFrame, colour_type, noise_sigma};
 use crate::survey::Survey;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -23,6 +23,9 @@ const MAX_LISTED_FAULTS: usize = 5;
 pub struct PictureCheck {
     /// Number of decoded frames.
     pub decoded: usize,
+    /// Bits of the brightest value, if the files are of 16 bits.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub used_bits: Option<u32>,
     /// Mean grey level, 0–255.
     pub grey: f64,
     /// Share of saturated pixels (black or white) among those that the mask does not hide, 0–1.
@@ -53,14 +56,14 @@ impl PictureCheck {
         }
         let step = survey.frames.len().div_ceil(MAX_DECODED_FRAMES).max(1);
         let sampled: Vec<&FrameFile> = survey.frames.iter().step_by(step).collect();
-        let decoded: Vec<Result<GreyImage, String>> =
+        let decoded: Vec<Result<(GreyImage, Option<u32>), String>> =
             sampled.par_map(|file| match StoredFrame::decode(file, width, height) {
                 Ok(frame) => {
                     let mut grey = frame.grey();
                     if let Some(mask) = survey.frames.mask() {
                         mask.blank(&mut grey);
                     }
-                    Ok(grey)
+                    Ok((grey, used_bits(file, &frame)))
                 }
                 Err(error) => Err(error.to_string()),
             });
@@ -71,7 +74,10 @@ impl PictureCheck {
         let mut pictures = Vec::new();
         for picture in decoded {
             match picture {
-                Ok(picture) => pictures.push(measure(&picture, hidden)),
+                Ok((picture, used_bits)) => pictures.push(Self {
+                    used_bits,
+                    ..measure(&picture, hidden)
+                }),
                 Err(fault) if !faults.contains(&fault) => faults.push(fault),
                 Err(_) => {}
             }
@@ -79,6 +85,7 @@ impl PictureCheck {
         let of = |value: fn(&Self) -> f64| median_or_zero(pictures.iter().map(value));
         let check = Self {
             decoded: pictures.len(),
+            used_bits: pictures.iter().filter_map(|p| p.used_bits).max(),
             grey: of(|p| p.grey),
             clipped: of(|p| p.clipped),
             noise_grey: of(|p| p.noise_grey),
@@ -100,6 +107,14 @@ fn header_fault(file: &FrameFile, size: [u32; 2]) -> Option<String> {
         )),
         Ok(_) => None,
     }
+}
+
+/// Bits of a frame's brightest value, if its file is of 16 bits.
+fn used_bits(file: &FrameFile, frame: &StoredFrame) -> Option<u32> {
+    let colour = colour_type(file).ok()?;
+    let is_deep = colour.bits_per_pixel() == 16 * u16::from(colour.channel_count());
+    let brightest = frame.brightest().filter(|_| is_deep)?;
+    Some(u16::BITS - brightest.leading_zeros())
 }
 
 /// Measures an image; the mask hides a share `hidden` of its pixels, whose values are NaN.
@@ -131,6 +146,7 @@ fn measure(picture: &GreyImage, hidden: f64) -> PictureCheck {
     let slope = 0.5 * (variance - noise_slope).max(0.0).sqrt();
     PictureCheck {
         decoded: 1,
+        used_bits: None,
         grey: if known > 0.0 { sum / known } else { 0.0 },
         clipped: 1.0 - known / pixels,
         noise_grey,

@@ -9,6 +9,9 @@ const MIN_OVERLAP: f64 = 0.25;
 const MAX_JITTER: f64 = 0.25;
 /// Smallest mean grey level without a warning: below it, noise covers the texture.
 const MIN_GREY: f64 = 12.0;
+/// Most bits of the brightest value in files of 16 bits with a warning: cameras of 10 to 14 bits
+/// often leave the upper bits empty.
+const MAX_USED_BITS: u32 = 14;
 /// Largest share of saturated pixels without a warning: more are not specular highlights only.
 const MAX_SATURATED: f64 = 0.2;
 /// Largest 1-σ of a frame's registration, pixels, without a warning.
@@ -21,7 +24,7 @@ pub(super) fn warnings(check: &Check) -> Vec<String> {
         frames_without_wall(check),
         open_turns(check),
         large_jitter(check),
-        dark_frames(check),
+        unused_bits(check).or_else(|| dark_frames(check)),
         saturated_frames(check),
         weak_texture(check),
         uncovered_image(check),
@@ -75,6 +78,18 @@ fn large_jitter(check: &Check) -> Option<String> {
             jitter.sigma_px,
             percent(jitter.share_of_overlap),
             percent(MAX_JITTER)
+        )
+    })
+}
+
+fn unused_bits(check: &Check) -> Option<String> {
+    let bits = check.pictures.used_bits?;
+    (9..=MAX_USED_BITS).contains(&bits).then(|| {
+        format!(
+            "the frames have files of 16 bits, but no value of more than {bits} (mean grey level \
+             {:.0} of 255): if the camera delivers {bits} bits, add bits = {bits} under [frames]; \
+             otherwise use more light or a longer exposure",
+            check.pictures.grey
         )
     })
 }

@@ -21,6 +21,7 @@ mod mutations;
 mod opencv;
 mod overlays;
 mod panorama;
+mod picture_files;
 mod plan;
 mod points;
 mod poses;

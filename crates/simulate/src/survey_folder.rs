@@ -178,6 +178,8 @@ fn write_text_files(
             angle_step_deg: None,
             times: None,
             mask: scene.shaft().map(|_| MASK_FILE.into()),
+            bits: None,
+            orientation: None,
             overlay: None,
         },
         poses: PosesSection {

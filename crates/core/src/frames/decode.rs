@@ -3,10 +3,12 @@
 use super::error::FrameError;
 use super::frame_file::{FrameFile, FrameSource};
 use super::picture_decoder::{Content, Input, decoder, open_picture};
+use super::picture_reading::PictureOrientation;
+use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, GrayImage, ImageDecoder, RgbImage};
 
 impl FrameFile {
-    /// Width and height, pixels, from the file's header.
+    /// Width and height, pixels, from the file's header; those of the picture as it is read.
     ///
     /// # Errors
     /// A missing or unknown file.
@@ -14,13 +16,44 @@ impl FrameFile {
         match &self.source {
             FrameSource::Video(video, _) => Ok(video.size()),
             FrameSource::Memory(picture) => Ok((picture.width(), picture.height())),
-            FrameSource::File => Ok(self.header()?.dimensions()),
+            FrameSource::File(reading) => {
+                let mut header = self.header()?;
+                let turn = reading.turn(orientation(&mut header));
+                Ok(turned_size(header.dimensions(), turn))
+            }
         }
+    }
+
+    /// The number of the EXIF orientation by which a picture file is to be turned or mirrored for
+    /// display, if it is.
+    ///
+    /// # Errors
+    /// A missing or unknown file.
+    pub fn exif_orientation(&self) -> Result<Option<u8>, FrameError> {
+        let FrameSource::File(_) = &self.source else {
+            return Ok(None);
+        };
+        let named = orientation(&mut self.header()?);
+        Ok((named != Orientation::NoTransforms).then(|| named.to_exif()))
     }
 
     /// The decoder of a picture file after reading its header.
     fn header(&self) -> Result<impl ImageDecoder, FrameError> {
         open_picture(&self.path).map_err(|error| self.decode_error(error.to_string()))
+    }
+}
+
+/// The EXIF orientation; none if the file has none that can be read.
+fn orientation(decoder: &mut impl ImageDecoder) -> Orientation {
+    decoder.orientation().unwrap_or(Orientation::NoTransforms)
+}
+
+/// The size of a picture after a turn.
+fn turned_size((width, height): (u32, u32), turn: Orientation) -> (u32, u32) {
+    use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
+    match turn {
+        Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH => (height, width),
+        _ => (width, height),
     }
 }
 
@@ -44,7 +77,7 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
         }
     };
     let fail = |what: String| file.decode_error(what);
-    match &file.source {
+    let reading = match &file.source {
         FrameSource::Video(video, picture) => {
             check(video.size())?;
             return video.decode(*picture).map_err(fail);
@@ -53,21 +86,27 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
             check((picture.width(), picture.height()))?;
             return Ok(DynamicImage::clone(picture));
         }
-        FrameSource::File => {}
-    }
+        FrameSource::File(reading) => reading,
+    };
     let content =
         Content::of(&file.path, width, height).map_err(|error| fail(error.to_string()))?;
     let bytes = content.as_ref();
     if bytes.starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(bytes) {
         return Err(fail("the JPEG file is truncated".to_owned()));
     }
-    if let Some(picture) = plain_tiff(content.input(), width, height) {
+    if reading.orientation == PictureOrientation::Stored
+        && let Some(picture) = plain_tiff(content.input(), width, height)
+    {
         return Ok(picture);
     }
-    let decoder = decoder(content.input()).map_err(|error| fail(error.to_string()))?;
+    let mut decoder = decoder(content.input()).map_err(|error| fail(error.to_string()))?;
+    let turn = reading.turn(orientation(&mut decoder));
     // Checked before allocating the memory that the header claims.
-    check(decoder.dimensions())?;
-    DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))
+    check(turned_size(decoder.dimensions(), turn))?;
+    let mut picture =
+        DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))?;
+    picture.apply_orientation(turn);
+    reading.scale(file, picture)
 }
 
 /// Decodes an uncompressed TIFF file of this size with 8 bits per channel; None for any other or
@@ -107,7 +146,7 @@ pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
     match &file.source {
         FrameSource::Video(video, _) => Ok(video.colour()),
         FrameSource::Memory(picture) => Ok(picture.color()),
-        FrameSource::File => Ok(file.header()?.color_type()),
+        FrameSource::File(_) => Ok(file.header()?.color_type()),
     }
 }
 

@@ -1,7 +1,10 @@
 //! Frames as files, as pictures of a video, or in memory.
 
 use super::error::FrameError;
+use super::picture_reading::PictureReading;
 use super::video::Video;
+use alphanumeric_sort::compare_path;
+use glob::MatchOptions;
 use image::DynamicImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,7 +14,7 @@ use tunnelstitch_geometry::files::printed;
 #[derive(Clone, Debug)]
 pub(super) enum FrameSource {
     /// A file of its own, [`FrameFile::path`].
-    File,
+    File(PictureReading),
     /// A video, and the index of the picture.
     Video(Arc<Video>, usize),
     /// A picture in memory.
@@ -36,7 +39,23 @@ impl FrameFile {
         Self {
             index,
             path,
-            source: FrameSource::File,
+            source: FrameSource::File(PictureReading::default()),
+        }
+    }
+
+    /// The frame with its picture file read as given; no other frame changes.
+    pub fn with_reading(mut self, reading: PictureReading) -> Self {
+        if let FrameSource::File(own) = &mut self.source {
+            *own = reading;
+        }
+        self
+    }
+
+    /// The reading of its picture file; None for other frames.
+    pub fn reading(&self) -> Option<PictureReading> {
+        match &self.source {
+            FrameSource::File(reading) => Some(*reading),
+            FrameSource::Video(..) | FrameSource::Memory(_) => None,
         }
     }
 
@@ -62,7 +81,7 @@ impl FrameFile {
     pub fn file(&self) -> &Path {
         match &self.source {
             FrameSource::Video(video, _) => video.path(),
-            FrameSource::File | FrameSource::Memory(_) => &self.path,
+            FrameSource::File(_) | FrameSource::Memory(_) => &self.path,
         }
     }
 
@@ -122,8 +141,9 @@ fn find_unreadable_name(folder: &Path, pattern: &str) -> Option<PathBuf> {
     None
 }
 
-/// Lists the files that match `pattern` (glob syntax, relative to `folder`), sorted by name,
-/// without the mask.
+/// Lists the files that match `pattern` (glob syntax, relative to `folder`, a backslash taken for a
+/// slash), in the natural order of their names (`frame2` before `frame10`), without the mask and
+/// without hidden ones, whose names begin with a dot.
 ///
 /// # Errors
 /// A malformed pattern, an unreadable folder, no match.
@@ -144,8 +164,14 @@ pub fn list_frames(
         ))
     })?;
     let escaped = glob::Pattern::escape(name);
+    let pattern = &pattern.replace('\\', "/");
     let full = Path::new(&escaped).join(pattern);
-    let found = glob::glob(&full.to_string_lossy()).map_err(|error| fail(error.to_string()))?;
+    let without_hidden = MatchOptions {
+        require_literal_leading_dot: true,
+        ..MatchOptions::default()
+    };
+    let found = glob::glob_with(&full.to_string_lossy(), without_hidden)
+        .map_err(|error| fail(error.to_string()))?;
     let mut paths = Vec::new();
     for path in found {
         let path = path.map_err(|error| fail(error.to_string()))?;
@@ -159,7 +185,8 @@ pub fn list_frames(
             printed(&path)
         )));
     }
-    paths.sort();
+    // Names that count as equal, such as 1 and 01, are ordered by their letters.
+    paths.sort_by(|a, b| compare_path(a, b).then_with(|| a.cmp(b)));
     if paths.is_empty() {
         return Err(FrameError::NoFrames {
             pattern: pattern.to_owned(),
@@ -170,4 +197,28 @@ pub fn list_frames(
         .enumerate()
         .map(|(index, path)| FrameFile::picture(index, path))
         .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_listed_in_natural_order_without_hidden_files() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::create_dir(dir.path().join("frames")).unwrap();
+        let files = [
+            "f1.png", "f10.png", "f2.png", "f02.png", "._f1.png", "mask.png",
+        ];
+        for name in files {
+            std::fs::write(dir.path().join("frames").join(name), "").unwrap();
+        }
+        let mask = dir.path().join("frames/mask.png");
+        for pattern in ["frames/*.png", r"frames\*.png"] {
+            let frames = list_frames(dir.path(), pattern, Some(&mask)).unwrap();
+            let names: Vec<String> = frames.iter().map(FrameFile::name).collect();
+            assert_eq!(names, ["f1.png", "f02.png", "f2.png", "f10.png"]);
+            assert!(frames.iter().enumerate().all(|(k, frame)| frame.index == k));
+        }
+    }
 }

@@ -13,6 +13,7 @@ mod local_normalisation;
 mod mask;
 mod noise;
 mod picture_decoder;
+mod picture_reading;
 mod pyramid;
 mod shading;
 mod static_pixels;
@@ -35,6 +36,7 @@ pub use mask::{Mask, PyramidMask};
 pub use noise::MAD_TO_SIGMA;
 pub use noise::{noise_at_level, noise_sigma};
 pub use picture_decoder::open_picture;
+pub use picture_reading::{PictureOrientation, PictureReading};
 pub use pyramid::Pyramid;
 pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
 pub use static_pixels::{

@@ -77,6 +77,14 @@ impl StoredFrame {
         GreyImage::new(self.width, self.height, data)
     }
 
+    /// The brightest value of a frame of 16 bits; None of one of 8 bits.
+    pub fn brightest(&self) -> Option<u16> {
+        match &self.values {
+            Values::Eight(_) => None,
+            Values::Sixteen(values) => values.iter().copied().max(),
+        }
+    }
+
     /// Memory in use, bytes.
     pub fn bytes(&self) -> usize {
         match &self.values {

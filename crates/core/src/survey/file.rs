@@ -4,6 +4,7 @@ use super::calibrate::CalibrateSection;
 use super::error::SurveyError;
 use super::poses_section::PosesSection;
 use super::tunnel::TunnelSection;
+use crate::frames::PictureOrientation;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -103,6 +104,14 @@ pub struct FramesSection {
     /// [`crate::frames::Mask`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mask: Option<PathBuf>,
+    /// Bits of the values in picture files of 16 bits: 12 where cameras leave the upper four empty;
+    /// 16 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bits: Option<u8>,
+    /// Orientation of pictures that are to be turned for display; by default as stored, unless the
+    /// calibration fits the turned ones only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation: Option<PictureOrientation>,
     /// Use of pixels that do not move with the wall; they are left out by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub overlay: Option<OverlayUse>,
@@ -219,6 +228,8 @@ mod tests {
                 angle_step_deg: Some(15.0),
                 times: Some("times.txt".into()),
                 mask: Some("mask.png".into()),
+                bits: None,
+                orientation: None,
                 overlay: Some(OverlayUse::Keep),
             },
             poses: PosesSection {

@@ -3,9 +3,10 @@
 use super::error::SurveyError;
 use super::file::FramesSection;
 use super::frame_times;
-use crate::frames::{self, FrameFile, Video};
+use crate::frames::{self, FrameFile, FrameSet, PictureOrientation, PictureReading, Video};
 use std::path::Path;
 use std::sync::Arc;
+use tunnelstitch_geometry::files::printed;
 
 /// The frames that a `[frames]` section names.
 pub(super) struct FrameList {
@@ -15,6 +16,21 @@ pub(super) struct FrameList {
     pub times_s: Option<Vec<f64>>,
     /// The video that contains the frames, if any.
     pub video: Option<Arc<Video>>,
+}
+
+/// The reading of picture files that a section asks for.
+///
+/// # Errors
+/// A number of bits that no file has, in words.
+fn picture_reading(section: &FramesSection) -> Result<PictureReading, &'static str> {
+    let bits = section.bits.unwrap_or(16);
+    if !(9..=16).contains(&bits) {
+        return Err("frames.bits must be between 9 and 16; files of 8 bits need none");
+    }
+    Ok(PictureReading {
+        white: u16::MAX >> (16 - bits),
+        orientation: section.orientation.unwrap_or_default(),
+    })
 }
 
 impl FrameList {
@@ -31,12 +47,11 @@ impl FrameList {
         folder: &Path,
         frame_times: Option<&Path>,
     ) -> Result<Self, SurveyError> {
-        let fail = |what: &str| {
-            Err(SurveyError::Value {
-                path: toml_path.to_owned(),
-                what: what.to_owned(),
-            })
+        let value = |what: &str| SurveyError::Value {
+            path: toml_path.to_owned(),
+            what: what.to_owned(),
         };
+        let fail = |what: &str| Err(value(what));
         let mut listing = match (&section.images, &section.video, section.every) {
             (Some(_), None, None) if section.angle_step_deg.is_some() => {
                 return fail(
@@ -46,11 +61,20 @@ impl FrameList {
             }
             (Some(pattern), None, None) => {
                 let mask = section.mask.as_ref().map(|mask| folder.join(mask));
+                let reading = picture_reading(section).map_err(value)?;
+                let listed = frames::list_frames(folder, pattern, mask.as_deref())?;
+                let read = listed.into_iter().map(|frame| frame.with_reading(reading));
                 Self {
-                    frames: frames::list_frames(folder, pattern, mask.as_deref())?,
+                    frames: read.collect(),
                     times_s: None,
                     video: None,
                 }
+            }
+            (None, Some(_), _) if section.bits.is_some() || section.orientation.is_some() => {
+                return fail(
+                    "frames.bits and frames.orientation go with frames.images; videos tell both \
+                     themselves",
+                );
             }
             (None, Some(_), Some(0)) => {
                 return fail(
@@ -83,6 +107,27 @@ impl FrameList {
         Ok(listing)
     }
 
+    /// The frames with pictures read as turned for display, if these alone have the size of the
+    /// calibration.
+    pub fn turned_to(mut self, size: (u32, u32), section: &FramesSection) -> Self {
+        let Some(first) = self.frames.first() else {
+            return self;
+        };
+        let turned = PictureReading {
+            orientation: PictureOrientation::Exif,
+            ..picture_reading(section).unwrap_or_default()
+        };
+        let fits = |frame: &FrameFile| frame.size().is_ok_and(|found| found == size);
+        let is_turned = section.orientation.is_none()
+            && !fits(first)
+            && fits(&first.clone().with_reading(turned));
+        if is_turned {
+            let frames = self.frames.into_iter();
+            self.frames = frames.map(|frame| frame.with_reading(turned)).collect();
+        }
+        self
+    }
+
     fn of_video(video: Arc<Video>, every: usize) -> Self {
         let pictures = || (0..video.pictures()).step_by(every);
         let frame = |(index, picture): (usize, usize)| FrameFile::in_video(index, &video, picture);
@@ -92,4 +137,29 @@ impl FrameList {
             video: Some(video),
         }
     }
+}
+
+/// The warning that pictures whose EXIF data name an orientation are turned, or that they are not,
+/// unless the section says which.
+pub(super) fn orientation_warning(section: &FramesSection, frames: &FrameSet) -> Option<String> {
+    let first = frames.iter().next()?;
+    let reading = first.reading().filter(|_| section.orientation.is_none())?;
+    // A file that cannot be read is an error of its own.
+    let number = first.exif_orientation().ok().flatten()?;
+    let named = format!(
+        "{}: by its EXIF orientation ({number}) it is to be turned or mirrored for display",
+        printed(first.file())
+    );
+    Some(match reading.orientation {
+        PictureOrientation::Stored => format!(
+            "{named}, which is not done, since the calibration fits the pictures as they are \
+             stored; if the camera was calibrated with turned pictures, add orientation = \
+             \"exif\" under [frames], otherwise orientation = \"stored\""
+        ),
+        PictureOrientation::Exif => format!(
+            "{named}, which is done, since the calibration fits only that; the poses must be \
+             those of the camera turned likewise; orientation = \"exif\" under [frames] confirms \
+             it"
+        ),
+    })
 }

@@ -4,7 +4,7 @@ use super::associate::TIME_TOLERANCE_S;
 use super::error::SurveyError;
 use super::file::read_survey_file;
 use super::file::{SURVEY_FILE, SurveyFile};
-use super::frame_list::FrameList;
+use super::frame_list::{FrameList, orientation_warning};
 use super::masked_wall::MaskedWall;
 use super::pose_reader::{InterpretedPoses, PoseReader};
 use super::poses_section::PosesSection;
@@ -121,7 +121,8 @@ impl Survey {
             frames,
             times_s,
             video,
-        } = FrameList::new(&file.frames, &toml_path, &folder, None)?;
+        } = FrameList::new(&file.frames, &toml_path, &folder, None)?
+            .turned_to((camera.width, camera.height), &file.frames);
         if let Some(video) = &video
             && video.rotation_deg() != 0
             && file.camera.readout_ms.is_some()
@@ -184,6 +185,7 @@ impl Survey {
             }
             None => None,
         };
+        warnings.extend(orientation_warning(&survey.file.frames, &survey.frames));
         warnings.extend(
             video
                 .iter()

@@ -1,0 +1,128 @@
+//! Picture files as cameras and computers name and write them.
+
+use crate::support::{edit, first_frames, simulate, succeed, text, tunnelstitch};
+use image::{DynamicImage, GrayImage};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// The frames of a survey, sorted by name.
+fn frames(survey: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(survey.join("frames")).unwrap();
+    let mut frames: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    frames.sort();
+    frames
+}
+
+/// The panorama by the true poses.
+fn panorama(survey: &Path) -> DynamicImage {
+    let out = survey.join("panorama.png");
+    let stitch = ["stitch", text(survey), "--poses", "truth", "--quiet"];
+    succeed(&[&stitch[..], &["--px-per-metre", "40", "--out", text(&out)]].concat());
+    image::open(out).unwrap()
+}
+
+fn check(survey: &Path) -> (Value, String) {
+    let output = tunnelstitch(&["check", text(survey), "--json"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    let check: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let warnings = check["warnings"].to_string();
+    (check, warnings)
+}
+
+/// Frames without leading zeros, with what macOS leaves beside them, found by a pattern of Windows.
+#[test]
+fn frames_are_taken_in_natural_order() {
+    let survey = first_frames(12);
+    let before = panorama(survey.path());
+    for (k, path) in frames(survey.path()).iter().enumerate() {
+        let name = format!("frame{}.jpg", k + 1);
+        std::fs::write(path.with_file_name(format!("._{name}")), "\0\x05\x16\x07").unwrap();
+        std::fs::rename(path, path.with_file_name(name)).unwrap();
+    }
+    let file = survey.path().join("survey.toml");
+    edit(&file, r#""frames/*.jpg""#, r"'frames\*.jpg'");
+    assert_eq!(panorama(survey.path()), before);
+}
+
+#[test]
+fn twelve_bits_in_sixteen_are_named_and_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("survey");
+    simulate(
+        &survey,
+        &["--frames", "4", "--size", "96x72", "--bits", "16"],
+    );
+    let grey = |survey: &Path| check(survey).0["pictures"]["grey"].as_f64().unwrap();
+    let before = grey(&survey);
+    for path in frames(&survey) {
+        let mut picture = image::open(&path).unwrap().into_luma16();
+        picture.pixels_mut().for_each(|pixel| pixel.0[0] >>= 4);
+        picture.save(&path).unwrap();
+    }
+    let (checked, warnings) = check(&survey);
+    assert_eq!(checked["pictures"]["used_bits"], 12);
+    assert!(warnings.contains("add bits = 12"), "{warnings}");
+    let file = survey.join("survey.toml");
+    edit(&file, "[frames]", "[frames]\nbits = 12");
+    let (_, warnings) = check(&survey);
+    assert!(!warnings.contains("bits"), "{warnings}");
+    assert!((grey(&survey) - before).abs() < 0.1);
+    edit(&file, "bits = 12", "bits = 10");
+    let output = tunnelstitch(&["check", text(&survey)]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(
+        said.contains("frames.bits = 10 allows no more than 1023"),
+        "{said}"
+    );
+}
+
+/// Writes a JPEG file with an EXIF orientation.
+fn write_jpeg(path: &Path, picture: &DynamicImage, orientation: u8) {
+    let mut bytes = Vec::new();
+    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 100);
+    picture.write_with_encoder(encoder).unwrap();
+    // Marker and length of the segment, a TIFF header, and a directory with one entry.
+    let exif = [
+        &b"\xff\xe1\0\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0"[..],
+        &[orientation, 0, 0, 0, 0, 0, 0],
+    ]
+    .concat();
+    bytes.splice(2..2, exif);
+    std::fs::write(path, bytes).unwrap();
+}
+
+/// Checks that pictures are the same but for what JPEG loses.
+fn assert_equal(a: &GrayImage, b: &GrayImage) {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let pairs = a.as_raw().iter().zip(b.as_raw());
+    let difference: f64 = pairs.map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
+    assert!(difference < 1.5 * a.as_raw().len() as f64, "{difference}");
+}
+
+#[test]
+fn pictures_are_turned_as_exif_says_if_the_calibration_fits_only_that() {
+    let survey = first_frames(3);
+    let before = panorama(survey.path()).into_luma8();
+    // To be turned clockwise.
+    for path in frames(survey.path()) {
+        let stored = image::open(&path).unwrap().rotate270();
+        write_jpeg(&path, &stored, 6);
+    }
+    let (_, warnings) = check(survey.path());
+    assert!(warnings.contains("EXIF orientation (6)") && warnings.contains("which is done"));
+    assert_equal(&panorama(survey.path()).into_luma8(), &before);
+    // Upside down, the calibration fits both; the survey says which.
+    for path in frames(survey.path()) {
+        let upright = image::open(&path).unwrap().rotate90();
+        write_jpeg(&path, &upright.rotate180(), 3);
+    }
+    let (_, warnings) = check(survey.path());
+    assert!(warnings.contains("which is not done"), "{warnings}");
+    let file = survey.path().join("survey.toml");
+    edit(&file, "[frames]", "[frames]\norientation = \"exif\"");
+    let (_, warnings) = check(survey.path());
+    assert!(!warnings.contains("EXIF"), "{warnings}");
+    assert_equal(&panorama(survey.path()).into_luma8(), &before);
+}
