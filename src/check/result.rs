@@ -7,6 +7,7 @@ use super::overlap::OverlapCheck;
 use super::pictures::PictureCheck;
 use super::poses::PosesCheck;
 use crate::frames::Mask;
+use crate::refine::FittingReadings;
 use crate::survey::OverlayReport;
 use serde::Serialize;
 
@@ -39,6 +40,9 @@ pub struct Check {
     pub pictures: PictureCheck,
     /// Time and memory that refining and stitching need.
     pub effort: Effort,
+    /// Other readings of poses and pictures, if neighbouring frames agree with them only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub readings: Option<FittingReadings>,
     /// Faults that make `refine` or `stitch` fail, each with its remedy.
     pub faults: Vec<String>,
     /// Conditions that need attention, each with its remedy.

@@ -9,7 +9,7 @@ use super::pictures::PictureCheck;
 use super::poses::PosesCheck;
 use super::result::Check;
 use super::warnings::warnings;
-use crate::refine::is_motionless;
+use crate::refine::{is_motionless, search_readings};
 use crate::render::native_px_per_metre;
 use crate::surface::SurfaceError;
 use crate::survey::{Overlay, Survey};
@@ -64,9 +64,17 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
         px_per_metre,
         pictures,
         effort: Effort::of(survey, px_per_metre),
+        readings: None,
         faults,
         warnings: survey.warnings.clone(),
     };
+    // Frames that cannot be read are faults already.
+    if check.faults.is_empty() {
+        match search_readings(survey) {
+            Ok(readings) => check.readings = readings,
+            Err(error) => check.faults.push(error.to_string()),
+        }
+    }
     if check.overlay.interlaced {
         check.warnings.push(interlacing_warning(survey));
     }

@@ -1,6 +1,7 @@
 //! Warnings of a check, each with its remedy.
 
 use super::result::Check;
+use crate::refine::FittingReadings;
 
 /// Smallest overlap of neighbours, share of a frame, without a warning.
 const MIN_OVERLAP: f64 = 0.25;
@@ -20,6 +21,7 @@ const MAX_REGISTRATION_SIGMA_PX: f64 = 0.1;
 /// Lists the warnings, the most severe first.
 pub(super) fn warnings(check: &Check) -> Vec<String> {
     let all = [
+        check.readings.as_ref().map(FittingReadings::sentence),
         weak_overlap(check),
         frames_without_wall(check),
         open_turns(check),

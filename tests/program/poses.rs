@@ -406,7 +406,7 @@ fn what_only_pictures_can_tell_is_named_by_refine() {
     };
     let said = refine(&[]);
     assert!(
-        said.contains("they agree with")
+        said.contains("they agree (7 of 7")
             && said.contains("--pose-convention w2c")
             && said.contains("--camera-axes opengl"),
         "{said}"
@@ -415,6 +415,46 @@ fn what_only_pictures_can_tell_is_named_by_refine() {
         let said = refine(&flag);
         assert!(!said.contains("agree with"), "{flag:?}: {said}");
     }
+}
+
+/// Poses and pictures in another order, unit or orientation: `check` names the line that mends it,
+/// and has nothing to say with that line.
+#[test]
+fn what_only_pictures_can_tell_is_named_by_check() {
+    let survey = first_frames(14);
+    let dir = survey.path();
+    let (toml, path) = (dir.join("survey.toml"), dir.join("baseline.tum"));
+    let planned = tum::read(&path).unwrap();
+    let right = std::fs::read_to_string(&toml).unwrap();
+    let check = || {
+        let said = succeed(&["check", text(dir), "--json"]);
+        let check: serde_json::Value = serde_json::from_str(&said).unwrap();
+        check["readings"]["readings"].to_string()
+    };
+    let assert_named = |line: &str, section: &str| {
+        let said = check().replace('\\', "");
+        assert!(said.contains(line), "{line}: {said}");
+        edit(&toml, section, &format!("{section}\n{line}"));
+        assert_eq!(check(), "null", "{line}");
+        std::fs::write(&toml, &right).unwrap();
+    };
+    assert_eq!(check(), "null");
+    let reversed = planned.iter().zip(planned.iter().rev());
+    let reversed = reversed.map(|(at, stamped)| StampedPose {
+        time_s: at.time_s,
+        ..*stamped
+    });
+    write_tum(&path, reversed.collect::<Vec<_>>());
+    assert_named("reversed = true", "[poses]");
+    let in_millimetres = |pose: &Pose| Pose::new(pose.r_wc, 1e3 * pose.t_wc);
+    write_tum(&path, mapped(&planned, in_millimetres));
+    assert_named("unit_m = 0.001", "[poses]");
+    write_tum(&path, planned);
+    for entry in std::fs::read_dir(dir.join("frames")).unwrap() {
+        let path = entry.unwrap().path();
+        image::open(&path).unwrap().rotate180().save(&path).unwrap();
+    }
+    assert_named("orientation = \"turned180\"", "[frames]");
 }
 
 /// `refine` accepts poses of any format with the same result, to the byte, as from TUM; `compare`

@@ -10,7 +10,7 @@ use crate::persist::atomic;
 use crate::progress::Progress;
 use crate::refine::{
     CalibrationReport, FrameFlag, FrameReport, Photometry, ReadoutEstimate, RefineOptions,
-    RefineReport, Refined, ShapeMode, search_pose_conventions,
+    RefineReport, Refined, ShapeMode, search_readings,
 };
 use crate::report::{REFINEMENT_FILE, SECTIONS_FILE};
 use crate::survey::{CalibrationGroup, Survey};
@@ -215,7 +215,7 @@ pub fn run(
         Ok((refined, json))
     })?;
     if 2 * refined.report.frames_on_prior > survey.frames.len() {
-        warn_of_pose_convention(&survey, terminal)?;
+        warn_of_reading(&survey, terminal)?;
     }
     if arguments.json {
         json::print_text(&json)?;
@@ -275,17 +275,14 @@ impl RefineArguments {
     }
 }
 
-/// Searches for a pose convention that the frames agree with, and warns if there is one.
-fn warn_of_pose_convention(survey: &Survey, terminal: &Terminal) -> Result<(), Failure> {
-    terminal.start("conventions", 1);
-    let others = search_pose_conventions(survey);
+/// Searches for a reading of poses and pictures that the frames agree with, and warns if there is
+/// one.
+fn warn_of_reading(survey: &Survey, terminal: &Terminal) -> Result<(), Failure> {
+    terminal.start("readings", 1);
+    let found = search_readings(survey);
     terminal.finish();
-    let others = others?;
-    if !others.is_empty() {
-        terminal.warn(format!(
-            "the frames do not agree with the poses as they are read; they agree with {}",
-            others.join(", or with ")
-        ));
+    if let Some(found) = found? {
+        terminal.warn(found.sentence());
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use crate::inspect::InspectError;
 use crate::persist::atomic::WriteError;
 use crate::persist::checkpoint::CheckpointError;
 use crate::raster::RasterError;
-use crate::refine::{CovarianceError, ProblemError, RefineError};
+use crate::refine::{CovarianceError, ProblemError, ReadingSearchError, RefineError};
 use crate::render::RenderError;
 use crate::report::ReportError;
 use crate::simulate::SimulateError;
@@ -109,6 +109,15 @@ impl From<RefineError> for Failure {
         match error {
             RefineError::Problem(ProblemError::Checkpoint(error)) => error.into(),
             _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<ReadingSearchError> for Failure {
+    fn from(error: ReadingSearchError) -> Self {
+        match error {
+            ReadingSearchError::Survey(error) => error.into(),
+            ReadingSearchError::Refine(error) => error.into(),
         }
     }
 }

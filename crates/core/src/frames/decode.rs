@@ -18,7 +18,7 @@ impl FrameFile {
             FrameSource::Memory(picture) => Ok((picture.width(), picture.height())),
             FrameSource::File(reading) => {
                 let mut header = self.header()?;
-                let turn = reading.turn(orientation(&mut header));
+                let turn = reading.orientation.turn(orientation(&mut header));
                 Ok(turned_size(header.dimensions(), turn))
             }
         }
@@ -100,7 +100,7 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
         return Ok(picture);
     }
     let mut decoder = decoder(content.input()).map_err(|error| fail(error.to_string()))?;
-    let turn = reading.turn(orientation(&mut decoder));
+    let turn = reading.orientation.turn(orientation(&mut decoder));
     // Checked before allocating the memory that the header claims.
     check(turned_size(decoder.dimensions(), turn))?;
     let mut picture =

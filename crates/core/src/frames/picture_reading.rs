@@ -6,16 +6,52 @@ use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer, Pixel};
 use serde::{Deserialize, Serialize};
 
-/// `[frames] orientation`: orientation of pictures whose EXIF data say that they are to be turned
-/// for display.
+/// `[frames] orientation`: orientation of the pictures against that in which they are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename_all = "lowercase")]
 pub enum PictureOrientation {
     /// As stored.
     #[default]
     Stored,
     /// As displayed: turned as EXIF says.
     Exif,
+    /// Turned upside down.
+    Turned180,
+    /// Mirrored: left is right.
+    Mirrored,
+    /// Mirrored and upside down.
+    Flipped,
+}
+
+impl PictureOrientation {
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stored => "stored",
+            Self::Exif => "exif",
+            Self::Turned180 => "turned180",
+            Self::Mirrored => "mirrored",
+            Self::Flipped => "flipped",
+        }
+    }
+
+    /// A picture without EXIF data, turned.
+    pub fn turned(self, picture: &DynamicImage) -> DynamicImage {
+        let mut picture = picture.clone();
+        picture.apply_orientation(self.turn(Orientation::NoTransforms));
+        picture
+    }
+
+    /// What is done to a stored picture whose EXIF data name `tag`.
+    pub(super) fn turn(self, tag: Orientation) -> Orientation {
+        match self {
+            Self::Stored => Orientation::NoTransforms,
+            Self::Exif => tag,
+            Self::Turned180 => Orientation::Rotate180,
+            Self::Mirrored => Orientation::FlipHorizontal,
+            Self::Flipped => Orientation::FlipVertical,
+        }
+    }
 }
 
 /// Reading of a picture file.
@@ -37,14 +73,6 @@ impl Default for PictureReading {
 }
 
 impl PictureReading {
-    /// The orientation of a picture whose EXIF data name `tag`.
-    pub(super) fn turn(&self, tag: Orientation) -> Orientation {
-        match self.orientation {
-            PictureOrientation::Stored => Orientation::NoTransforms,
-            PictureOrientation::Exif => tag,
-        }
-    }
-
     /// Scales the values of a picture of 16 bits, so that white is 65535.
     ///
     /// # Errors

@@ -150,16 +150,18 @@ pub(super) fn orientation_warning(section: &FramesSection, frames: &FrameSet) ->
         "{}: by its EXIF orientation ({number}) it is to be turned or mirrored for display",
         printed(first.file())
     );
-    Some(match reading.orientation {
-        PictureOrientation::Stored => format!(
-            "{named}, which is not done, since the calibration fits the pictures as they are \
-             stored; if the camera was calibrated with turned pictures, add orientation = \
-             \"exif\" under [frames], otherwise orientation = \"stored\""
-        ),
-        PictureOrientation::Exif => format!(
+    let is_turned = reading.orientation == PictureOrientation::Exif;
+    Some(if is_turned {
+        format!(
             "{named}, which is done, since the calibration fits only that; the poses must be \
              those of the camera turned likewise; orientation = \"exif\" under [frames] confirms \
              it"
-        ),
+        )
+    } else {
+        format!(
+            "{named}, which is not done, since the calibration fits the pictures as they are \
+             stored; if the camera was calibrated with turned pictures, add orientation = \
+             \"exif\" under [frames], otherwise orientation = \"stored\""
+        )
     })
 }

@@ -19,7 +19,7 @@ use tunnelstitch_geometry::surface::{
     Bend, RadialField, Surface, WallRegions, bent, displaced, with_range,
 };
 use tunnelstitch_geometry::trajectory::{
-    Convention, Jitter, MAX_SEARCH_VOLUME_DEG3, Pose, Shutter, StampedPose, Trajectory, poses_of,
+    Jitter, MAX_SEARCH_VOLUME_DEG3, Pose, Shutter, StampedPose, Trajectory, poses_of,
     read_tunnel_frame,
 };
 
@@ -209,7 +209,7 @@ impl Survey {
 
     /// Initial poses carried along with the bend of the tunnel: they are those of the tunnel as
     /// planned.
-    fn carried(&self, initial: Trajectory) -> Trajectory {
+    pub(super) fn carried(&self, initial: Trajectory) -> Trajectory {
         let carry = |stamped: StampedPose| match &self.bend {
             Some(bend) => StampedPose {
                 pose: bend.bent(&stamped.pose),
@@ -236,51 +236,6 @@ impl Survey {
         let warning =
             pose_validation::validate_poses(surface, &self.camera, &reading, &poses, path)?;
         Ok((trajectory, warning))
-    }
-
-    /// The first frames of the survey with their initial poses in the given convention, and in
-    /// every other convention that leaves all cameras inside, each with its flags (none for the
-    /// first), in order of the number of flags.
-    ///
-    /// # Errors
-    /// The errors of [`Survey::open`], if the file has changed since.
-    pub fn pose_convention_variants(
-        &self,
-        most_frames: usize,
-    ) -> Result<Vec<(Vec<String>, Self)>, SurveyError> {
-        let section = &self.file.poses;
-        let times_s = self.times_s.as_deref();
-        let reading = PoseReader::new(section, &self.folder, &self.frames, times_s)?
-            .read(&self.folder.join(&section.initial))?;
-        let given = (Vec::new(), reading.convention);
-        let possible = pose_validation::feasible_conventions(self.surface.as_ref(), &reading);
-        let survey = |(flags, convention): (Vec<String>, Convention)| {
-            let stamped = reading.given.iter().map(|stamped| StampedPose {
-                time_s: stamped.time_s,
-                pose: convention.to_tunnel(&stamped.pose),
-            });
-            let candidate = Self {
-                folder: self.folder.clone(),
-                file: self.file.clone(),
-                camera: self.camera,
-                surface: Arc::clone(&self.surface),
-                nominal: Arc::clone(&self.nominal),
-                bend: self.bend,
-                displacement: self.displacement.clone(),
-                shape_sigma_m: self.shape_sigma_m,
-                radius_sigma: self.radius_sigma,
-                ignored: self.ignored.clone(),
-                frames: self.frames.first(most_frames),
-                initial: self.carried(stamped.take(most_frames).collect()),
-                truth: None,
-                prior: self.prior,
-                warnings: Vec::new(),
-                times_s: None,
-                own_files: self.own_files.clone(),
-            };
-            (flags, candidate)
-        };
-        Ok(std::iter::once(given).chain(possible).map(survey).collect())
     }
 
     /// The files of the survey except the frames, even if others were read in their place.
@@ -419,6 +374,13 @@ fn check_values(file: &SurveyFile) -> Result<(), String> {
     if !(0.0..=1e6).contains(&tolerance_s) {
         return Err(format!(
             "poses.time_tolerance_s is {tolerance_s}; it must be seconds, 0 or more"
+        ));
+    }
+    if let Some(unit_m) = file.poses.unit_m
+        && !(unit_m.is_finite() && unit_m > 0.0)
+    {
+        return Err(format!(
+            "poses.unit_m is {unit_m}; it must be the length of a unit in metres, such as 0.001"
         ));
     }
     Ok(())

@@ -134,6 +134,14 @@ impl<'a> PoseReader<'a> {
                 });
             }
         }
-        Ok(InterpretedPoses { given, convention })
+        let read = InterpretedPoses { given, convention };
+        let read = match self.section.unit_m {
+            Some(unit_m) => read.in_unit(unit_m),
+            None => read,
+        };
+        Ok(match self.section.reversed {
+            Some(true) => read.reversed(),
+            _ => read,
+        })
     }
 }

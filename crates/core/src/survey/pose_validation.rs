@@ -5,7 +5,7 @@
 //! along the axis: the usual one of a sewer robot does.) In these cases other conventions are
 //! tried, the simplest first, and the plausible one is named with its flag. A wrong convention that
 //! leaves all cameras inside and looking at the wall can only be detected from the images
-//! ([`Survey::pose_convention_variants`](crate::survey::Survey::pose_convention_variants)).
+//! ([`Survey::pose_readings`](crate::survey::Survey::pose_readings)).
 
 use super::error::SurveyError;
 use super::pose_reader::InterpretedPoses;

@@ -32,6 +32,12 @@ pub struct PosesSection {
     /// [`read_tunnel_frame`](tunnelstitch_geometry::trajectory::read_tunnel_frame).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tunnel_frame: Option<PathBuf>,
+    /// True if the file's poses are in the reverse order of the frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reversed: Option<bool>,
+    /// Length of the file's unit of positions, metres; 1 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_m: Option<f64>,
     /// The criterion that associates poses with frames; by default their names, if the file has
     /// any, else their order.
     #[serde(default, skip_serializing_if = "Option::is_none")]

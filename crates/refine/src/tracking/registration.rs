@@ -67,6 +67,8 @@ pub struct Registered {
     /// True if the frame matches the wall as well as it should; otherwise the wall itself may be
     /// bent.
     pub is_reliable: bool,
+    /// Deviation from the prior's prediction, `½ eᵀΣ⁻¹e`.
+    pub deviation: f64,
 }
 
 /// The effort that registering frames may take: hypotheses that are refined.
@@ -311,6 +313,7 @@ impl<'r> Registration<'r> {
         Ok(Registered {
             estimate,
             is_reliable: candidate.is_reliable(),
+            deviation: candidate.deviation,
         })
     }
 

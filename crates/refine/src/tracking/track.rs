@@ -171,6 +171,7 @@ impl Tracking {
             Ok(Registered {
                 estimate,
                 is_reliable,
+                ..
             }) => {
                 self.successes += 1;
                 states.estimates[k] = estimate;

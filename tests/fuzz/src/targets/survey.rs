@@ -9,6 +9,6 @@ pub fn run(data: &[u8]) {
     std::fs::write(&path, data).unwrap();
     if let Ok(survey) = Survey::open(&path) {
         assert_eq!(survey.initial.len(), survey.frames.len());
-        let _ = survey.pose_convention_variants(2);
+        let _ = survey.pose_readings();
     }
 }

@@ -1,0 +1,185 @@
+//! Readings of a survey's poses and pictures that people get wrong, to be told by the pictures.
+
+use super::error::SurveyError;
+use super::open::Survey;
+use super::pose_reader::{InterpretedPoses, PoseReader};
+use super::pose_validation::feasible_conventions;
+use crate::frames::PictureOrientation;
+use nalgebra::{Quaternion, UnitQuaternion};
+use tunnelstitch_geometry::surface::Surface;
+use tunnelstitch_geometry::trajectory::{Convention, Pose, StampedPose, Trajectory};
+
+/// Units that positions may be given in instead of metres: their names, and their lengths, metres.
+const UNITS: [(&str, f64); 3] = [
+    ("millimetres", 0.001),
+    ("centimetres", 0.01),
+    ("feet", 0.3048),
+];
+
+/// Pictures may be stored otherwise than the camera saw them.
+const ORIENTATIONS: [(&str, PictureOrientation); 3] = [
+    ("the pictures upside down", PictureOrientation::Turned180),
+    ("the pictures mirrored", PictureOrientation::Mirrored),
+    (
+        "the pictures mirrored and upside down",
+        PictureOrientation::Flipped,
+    ),
+];
+
+/// A reading of the survey's poses and pictures.
+#[derive(Clone, Debug)]
+pub struct PoseReading {
+    /// The reading, and what of the command line or `survey.toml` asks for it; empty for the
+    /// reading given.
+    pub remedy: String,
+    /// Number of its changes to the reading given.
+    pub changes: usize,
+    /// The initial poses.
+    pub initial: Trajectory,
+    /// The orientation of the pictures against the one given.
+    pub orientation: PictureOrientation,
+}
+
+impl PoseReading {
+    fn of_poses(remedy: String, initial: Trajectory) -> Self {
+        Self {
+            remedy,
+            changes: 1,
+            initial,
+            orientation: PictureOrientation::Stored,
+        }
+    }
+}
+
+impl Survey {
+    /// The initial poses as given, followed by every other reading that leaves all cameras inside:
+    /// other conventions, the reverse order, quaternions that begin with w, other units, and
+    /// pictures that are turned or mirrored.
+    ///
+    /// # Errors
+    /// The errors of [`Survey::open`], if the file has changed since.
+    pub fn pose_readings(&self) -> Result<Vec<PoseReading>, SurveyError> {
+        let section = &self.file.poses;
+        let times_s = self.times_s.as_deref();
+        let given = PoseReader::new(section, &self.folder, &self.frames, times_s)?
+            .read(&self.folder.join(&section.initial))?;
+        let surface = self.surface.as_ref();
+        let mut readings = vec![PoseReading {
+            changes: 0,
+            ..PoseReading::of_poses(String::new(), self.initial.clone())
+        }];
+        for (flags, convention) in feasible_conventions(surface, &given) {
+            readings.push(PoseReading {
+                changes: flags.len(),
+                ..PoseReading::of_poses(flags.join(" and "), given.in_convention(&convention))
+            });
+        }
+        let mut others = vec![(
+            "quaternions as w x y z (quaternion = \"wxyz\" under [poses])".to_owned(),
+            given.changed(|pose| with_w_first(&pose)),
+        )];
+        if section.reversed.is_none() {
+            let remedy = "the poses in reverse order (reversed = true under [poses])";
+            others.push((remedy.to_owned(), given.reversed()));
+        }
+        for (name, unit_m) in UNITS.into_iter().filter(|_| section.unit_m.is_none()) {
+            let remedy = format!("positions in {name} (unit_m = {unit_m} under [poses])");
+            others.push((remedy, given.in_unit(unit_m)));
+        }
+        readings.extend(others.into_iter().map(|(remedy, other)| {
+            PoseReading::of_poses(remedy, other.in_convention(&given.convention))
+        }));
+        readings.retain(|reading| is_inside(surface, &reading.initial));
+        for reading in &mut readings[1..] {
+            reading.initial = self.carried(std::mem::take(&mut reading.initial));
+        }
+        let turned = ORIENTATIONS.map(|(name, orientation)| PoseReading {
+            remedy: format!(
+                "{name} (orientation = \"{}\" under [frames])",
+                orientation.name()
+            ),
+            orientation,
+            ..PoseReading::of_poses(String::new(), self.initial.clone())
+        });
+        // Pictures of videos are displayed as they should be.
+        let has_files = self.frames.iter().all(|frame| frame.reading().is_some());
+        readings.extend(turned.into_iter().filter(|_| has_files));
+        Ok(readings)
+    }
+}
+
+impl InterpretedPoses {
+    /// The poses in the tunnel's frame, interpreted in another convention.
+    fn in_convention(&self, convention: &Convention) -> Trajectory {
+        let poses = self.poses_in(convention).into_iter();
+        let stamped = self.given.iter().zip(poses);
+        stamped
+            .map(|(given, pose)| StampedPose {
+                time_s: given.time_s,
+                pose,
+            })
+            .collect()
+    }
+
+    /// The file's poses, each changed.
+    fn changed(&self, change: impl Fn(Pose) -> Pose) -> Self {
+        let given = self.given.iter().map(|stamped| StampedPose {
+            time_s: stamped.time_s,
+            pose: change(stamped.pose),
+        });
+        Self {
+            given: given.collect(),
+            convention: self.convention,
+        }
+    }
+
+    /// The file's poses with positions of another unit, metres.
+    pub(super) fn in_unit(&self, unit_m: f64) -> Self {
+        self.changed(|pose| Pose::new(pose.r_wc, pose.t_wc * unit_m))
+    }
+
+    /// The file's poses in reverse order, at the times of the frames.
+    pub(super) fn reversed(&self) -> Self {
+        let poses = self.given.iter().rev();
+        let given = self
+            .given
+            .iter()
+            .zip(poses)
+            .map(|(at, stamped)| StampedPose {
+                time_s: at.time_s,
+                pose: stamped.pose,
+            });
+        Self {
+            given: given.collect(),
+            convention: self.convention,
+        }
+    }
+}
+
+/// A pose whose quaternion `x y z w` was in truth `w x y z`.
+fn with_w_first(pose: &Pose) -> Pose {
+    let [w, x, y, z] = pose.r_wc.coords.into();
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+    Pose::new(rotation, pose.t_wc)
+}
+
+fn is_inside(surface: &dyn Surface, poses: &Trajectory) -> bool {
+    let mut poses = poses.iter();
+    poses.all(|stamped| surface.check_inside(&stamped.pose.t_wc).is_ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_quaternion_written_with_w_first_is_read_back() {
+        let right = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -1.2, 0.7));
+        let [x, y, z, w] = right.coords.into();
+        // The file's w x y z, taken for x y z w.
+        let wrong = UnitQuaternion::from_quaternion(Quaternion::new(z, w, x, y));
+        let read = with_w_first(&Pose::new(wrong, Vector3::zeros()));
+        assert!(read.r_wc.angle_to(&right) < 1e-12);
+    }
+}
