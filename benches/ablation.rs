@@ -1,9 +1,9 @@
 //! Accuracy of the estimator on surveys with true poses, a line per survey:
 //! `cargo bench --bench ablation -- SURVEY...`.
 //!
-//! A line has the survey's name, the root mean square wall error of the photometric frames in pixels
-//! (the gauge fixed by the majority), the number of frames, of photometric ones, and of false
-//! successes. `benches/ablation.py` builds this program without one technique at a time and
+//! A line has the survey's name, the root mean square wall error of the photometric frames in
+//! pixels (the gauge fixed by the majority), the number of frames, of photometric ones, and of
+//! false successes. `benches/ablation.py` builds this program without one technique at a time and
 //! compares the lines.
 
 use std::sync::Arc;

@@ -106,7 +106,7 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
     let mut picture =
         DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))?;
     picture.apply_orientation(turn);
-    reading.scale(file, picture)
+    reading.scale(picture).map_err(fail)
 }
 
 /// Decodes an uncompressed TIFF file of this size with 8 bits per channel; None for any other or

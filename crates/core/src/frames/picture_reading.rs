@@ -1,7 +1,5 @@
 //! Readings of picture files: the brightness of white, and the orientation.
 
-use super::error::FrameError;
-use super::frame_file::FrameFile;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer, Pixel};
 use serde::{Deserialize, Serialize};
@@ -42,7 +40,7 @@ impl PictureOrientation {
         picture
     }
 
-    /// What is done to a stored picture whose EXIF data name `tag`.
+    /// Transformation of a stored picture whose EXIF data name `tag`.
     pub(super) fn turn(self, tag: Orientation) -> Orientation {
         match self {
             Self::Stored => Orientation::NoTransforms,
@@ -76,12 +74,8 @@ impl PictureReading {
     /// Scales the values of a picture of 16 bits, so that white is 65535.
     ///
     /// # Errors
-    /// [`FrameError::Decode`] for a picture that is brighter than white.
-    pub(super) fn scale(
-        &self,
-        file: &FrameFile,
-        mut picture: DynamicImage,
-    ) -> Result<DynamicImage, FrameError> {
+    /// A picture that is brighter than white, in words.
+    pub(super) fn scale(&self, mut picture: DynamicImage) -> Result<DynamicImage, String> {
         if self.white == u16::MAX {
             return Ok(picture);
         }
@@ -94,10 +88,10 @@ impl PictureReading {
         };
         if brightest > self.white {
             let bits = u16::BITS - self.white.leading_zeros();
-            return Err(file.decode_error(format!(
+            return Err(format!(
                 "it has the value {brightest}, but frames.bits = {bits} allows no more than {}",
                 self.white
-            )));
+            ));
         }
         Ok(picture)
     }
@@ -125,7 +119,7 @@ fn scale_values<P: Pixel<Subpixel = u16>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::load_colour;
+    use crate::frames::{FrameError, FrameFile, load_colour};
     use image::{GrayImage, Luma};
 
     fn read(picture: &DynamicImage, reading: PictureReading) -> Result<DynamicImage, FrameError> {

@@ -6,7 +6,6 @@ use super::exchange::exchange;
 use super::parent::parent_folder;
 use super::staged::StagedFolder;
 use super::temporary::{self, TemporaryFile, TemporaryFolder};
-use super::write::write;
 use super::{durable, file};
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -47,8 +46,9 @@ impl OutputSet {
         fill: impl FnOnce(&mut BufWriter<ErrorKeeper<File>>) -> io::Result<()>,
     ) -> Result<(), WriteError> {
         if let Some(place) = self.place_in_folder(path) {
-            let written = write(&place, fill);
-            written.map_err(|error| WriteError::new(path, error.source))?;
+            let fail = |source| WriteError::new(path, source);
+            let new = file::fill_temporary(&place, fill).map_err(|error| fail(error.source))?;
+            std::fs::rename(&*new.path, &place).map_err(fail)?;
             durable::sync_folder(parent_folder(&place));
             return Ok(());
         }
