@@ -313,6 +313,106 @@ fn a_list_of_times_ties_poses_to_numbered_frames() {
     );
 }
 
+/// Poses as ORB-SLAM3, spreadsheets, ROS and others write them are those of TUM.
+#[test]
+fn files_of_other_programs_are_read_as_they_are() {
+    let survey = first_frames(3);
+    let dir = survey.path();
+    let truth = tum::read(&dir.join("groundtruth.tum")).unwrap();
+    let begin_ns = 1_403_636_579_763_555_584u64;
+    let times_ns: Vec<u64> = (0..3).map(|k| begin_ns + k * 50_000_000).collect();
+    rename_by_time(dir, &times_ns);
+    // Rows of a time, a translation and a quaternion, in one order or the other.
+    let rows = |is_w_first: bool, separator: &str| -> Vec<String> {
+        let row = |(stamped, time_ns): (&StampedPose, &u64)| {
+            let (t, q) = (stamped.pose.t_wc, stamped.pose.r_wc);
+            let mut numbers = [t.x, t.y, t.z, q.i, q.j, q.k, q.w];
+            if is_w_first {
+                numbers[3..].rotate_right(1);
+            }
+            let words = numbers.iter().map(f64::to_string);
+            let words: Vec<String> = std::iter::once(format!("{time_ns}.000000"))
+                .chain(words)
+                .collect();
+            words.join(separator)
+        };
+        truth.iter().zip(&times_ns).map(row).collect()
+    };
+    let ros = "%time;field.pose.position.x;field.pose.position.y;field.pose.position.z;\
+               field.pose.orientation.x;field.pose.orientation.y;field.pose.orientation.z;\
+               field.pose.orientation.w\n";
+    let own = "when;east;north;up;qx;qy;qz;q0\n";
+    let twice = |mut rows: Vec<String>| {
+        rows.insert(1, rows[1].clone());
+        rows.join("\n")
+    };
+    let by_time = ["--associate", "time"];
+    let columns = ["--pose-columns", "time_s=when,tx=east,ty=north,tz=up,qw=q0"];
+    for (content, more) in [
+        (rows(false, " ").join("\n"), &[][..]),
+        (rows(false, ", ").join("\n"), &[]),
+        (twice(rows(false, "\t")), &[]),
+        (
+            format!(
+                "# time tx ty tz qw qx qy qz\n{}",
+                rows(true, " ").join("\n")
+            ),
+            &[],
+        ),
+        (rows(true, " ").join("\n"), &["--pose-quaternion", "wxyz"]),
+        (
+            format!(
+                "\u{feff}sep=;\r\n{ros}{}",
+                rows(false, ";").join("\r\n").replace('.', ",")
+            ),
+            &[],
+        ),
+        (format!("{own}{}", rows(false, ";").join("\n")), &columns),
+    ] {
+        let poses = dir.join("others.txt");
+        std::fs::write(&poses, &content).unwrap();
+        let found = read_by_the_program(dir, &poses, &[&by_time[..], more].concat());
+        assert_same(&found, &truth, 1e-12);
+        assert!(
+            (found[1].time_s - 1_403_636_579.813_555_6).abs() < 1e-6,
+            "{content}"
+        );
+    }
+
+    // The keys of survey.toml do what the flags do, and errors name lines and columns.
+    let toml = dir.join("survey.toml");
+    edit(&toml, "truth = \"groundtruth.tum\"", "");
+    edit(
+        &toml,
+        "initial = \"baseline.tum\"",
+        "initial = \"own.csv\"\nassociate = \"time\"\n\
+         columns = { time_s = \"when\", tx = \"east\", ty = \"north\", tz = \"up\", qw = \"q0\" }",
+    );
+    let (own_file, out) = (dir.join("own.csv"), dir.join("own.tum"));
+    let content = format!("{own}{}", rows(false, ";").join("\n"));
+    std::fs::write(&own_file, &content).unwrap();
+    convert(dir, "initial", "tum", &out, &[]);
+    assert_same(&tum::read(&out).unwrap(), &truth, 1e-12);
+    let arguments = ["convert", text(dir), "--to", "tum", "--out", text(&out)];
+    std::fs::write(&own_file, content.replace("north", "south")).unwrap();
+    let message = fail(&arguments, 3);
+    assert!(
+        message.contains("own.csv:1: no column `north`") && message.contains("`east`, `south`"),
+        "{message}"
+    );
+    let [header, first, second, ..] = content.lines().collect::<Vec<_>>()[..] else {
+        panic!("{content}");
+    };
+    let words: Vec<&str> = second.split(';').collect();
+    let moved = [&words[..1], &["0.5"], &words[2..]].concat().join(";");
+    std::fs::write(&own_file, format!("{header}\n{first}\n{second}\n{moved}\n")).unwrap();
+    let message = fail(&arguments, 3);
+    assert!(
+        message.contains("own.csv:4: ") && message.contains("lines 3 and 4"),
+        "{message}"
+    );
+}
+
 /// Poses of other conventions are refused with the flag that corrects them, and are correct with
 /// it.
 #[test]

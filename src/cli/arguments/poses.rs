@@ -3,7 +3,9 @@
 use crate::cli::output::{Failure, Terminal};
 use crate::report::REFINEMENT_FILE;
 use crate::survey::{Associate, PosesSection, SURVEY_FILE, Survey, SurveyError, SurveyFile};
-use crate::trajectory::{CameraAxes, Direction, PoseFormat, Trajectory};
+use crate::trajectory::{
+    CameraAxes, Direction, PoseColumn, PoseFormat, QuaternionOrder, Trajectory,
+};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +16,19 @@ pub struct PoseReadingArguments {
     /// Format of the poses [default: detected from the content].
     #[arg(long, value_enum, value_name = "FORMAT")]
     pose_format: Option<FormatArgument>,
+    /// Names of columns in the header of a CSV file, for columns whose names are not known:
+    /// COLUMN is frame, time_s, time_ns, tx, ty, tz, qx, qy, qz or qw.
+    #[arg(
+        long,
+        value_name = "COLUMN=NAME",
+        value_delimiter = ',',
+        value_parser = parse_column
+    )]
+    pose_columns: Vec<(PoseColumn, String)>,
+    /// Order of the quaternion in TUM files: xyzw or wxyz [default: as a comment before the poses
+    /// names it, or xyzw].
+    #[arg(long, value_enum, value_name = "ORDER")]
+    pose_quaternion: Option<QuaternionArgument>,
     /// Direction of the poses: camera to world (c2w) or world to camera (w2c)
     /// [default: that of the format].
     #[arg(long, value_enum, value_name = "C2W|W2C")]
@@ -65,6 +80,15 @@ enum FormatArgument {
     Euroc,
 }
 
+/// Names of orders of quaternions.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum QuaternionArgument {
+    /// qx qy qz qw.
+    Xyzw,
+    /// qw qx qy qz.
+    Wxyz,
+}
+
 /// Names of directions.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum DirectionArgument {
@@ -103,6 +127,15 @@ impl From<FormatArgument> for PoseFormat {
             FormatArgument::Colmap => Self::Colmap,
             FormatArgument::Nerfstudio => Self::Nerfstudio,
             FormatArgument::Euroc => Self::Euroc,
+        }
+    }
+}
+
+impl From<QuaternionArgument> for QuaternionOrder {
+    fn from(order: QuaternionArgument) -> Self {
+        match order {
+            QuaternionArgument::Xyzw => Self::Xyzw,
+            QuaternionArgument::Wxyz => Self::Wxyz,
         }
     }
 }
@@ -182,6 +215,8 @@ impl PoseReadingArguments {
     fn apply_to(&self, file: &mut SurveyFile) {
         let poses = &mut file.poses;
         replace(&mut poses.format, self.pose_format.map(Into::into));
+        poses.columns.extend(self.pose_columns.iter().cloned());
+        replace(&mut poses.quaternion, self.pose_quaternion.map(Into::into));
         replace(&mut poses.convention, self.pose_convention.map(Into::into));
         replace(&mut poses.camera_axes, self.camera_axes.map(Into::into));
         replace(
@@ -200,6 +235,14 @@ impl PoseReadingArguments {
             self.frame_times.as_deref().map(absolute),
         );
     }
+}
+
+/// Parses `COLUMN=NAME`.
+fn parse_column(argument: &str) -> Result<(PoseColumn, String), String> {
+    let (column, name) = argument
+        .split_once('=')
+        .ok_or("it must be COLUMN=NAME, as tx=east")?;
+    Ok((column.parse()?, name.to_owned()))
 }
 
 fn replace<T>(value: &mut Option<T>, other: Option<T>) {

@@ -6,7 +6,9 @@ use image::ImageDecoder;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
-use tunnelstitch_geometry::trajectory::{PoseFile, read_poses};
+use tunnelstitch_geometry::trajectory::{
+    DuplicateTimes, PoseFile, PoseFileOptions, read_poses_with,
+};
 
 /// Levels of folders below the searched one.
 const MAX_DEPTH: usize = 3;
@@ -73,6 +75,11 @@ impl Discovery {
         files.sort();
         let mut groups: BTreeMap<(PathBuf, String), Vec<&PathBuf>> = BTreeMap::new();
         let mut found = Self::default();
+        // Poses with a time that is there twice are those to associate by time.
+        let options = PoseFileOptions {
+            duplicate_times: DuplicateTimes::Merge,
+            ..PoseFileOptions::default()
+        };
         for file in &files {
             let extension = file
                 .extension()
@@ -109,7 +116,7 @@ impl Discovery {
             }
             if matches!(lower.as_str(), "txt" | "tum" | "csv" | "json" | "kitti")
                 && bytes <= MAX_POSES_BYTES
-                && let Ok(poses) = read_poses(&path, None)
+                && let Ok(poses) = read_poses_with(&path, &options)
             {
                 found.poses.push((file.clone(), poses));
             }

@@ -195,7 +195,9 @@ mod tests {
     use crate::survey::ignore::IgnoreSection;
     use crate::survey::open::Survey;
     use crate::survey::tunnel::Shape;
-    use tunnelstitch_geometry::trajectory::{CameraAxes, Direction, PoseFormat};
+    use tunnelstitch_geometry::trajectory::{
+        CameraAxes, Direction, PoseColumn, PoseFormat, QuaternionOrder,
+    };
 
     #[test]
     fn the_file_round_trips() {
@@ -234,6 +236,8 @@ mod tests {
             },
             poses: PosesSection {
                 format: Some(PoseFormat::Csv),
+                columns: [(PoseColumn::Tx, "px".to_owned())].into(),
+                quaternion: Some(QuaternionOrder::Wxyz),
                 convention: Some(Direction::WorldToCamera),
                 camera_axes: Some(CameraAxes::OpenGl),
                 associate: Some(Associate::Time),

@@ -32,6 +32,8 @@
 //! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC: see the content
 //! truth = "groundtruth.tum"   # optional: for comparison; all keys below apply to both
 //! format = "tum"              # optional, like all below: overrides the detection
+//! columns = { tx = "px" }     # CSV: names of columns in the header that are not known
+//! quaternion = "wxyz"         # TUM: or "xyzw"; by default as a comment names it, or "xyzw"
 //! convention = "c2w"          # or "w2c"; the default depends on the format
 //! camera_axes = "opencv"      # or "opengl"; the default depends on the format
 //! body_to_camera = "cam.yaml" # for poses of a body (`trajectory::read_camera_in_body`)

@@ -8,7 +8,7 @@ use crate::frames::FrameFile;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::{
-    Convention, Pose, PoseFormat, StampedPose, Trajectory, read_camera_in_body, read_poses,
+    Convention, Pose, PoseFormat, StampedPose, Trajectory, read_camera_in_body, read_poses_with,
     read_tunnel_frame,
 };
 
@@ -27,6 +27,8 @@ pub(super) struct InterpretedPoses {
     pub given: Trajectory,
     /// The convention.
     pub convention: Convention,
+    /// The file's format.
+    pub format: PoseFormat,
 }
 
 impl InterpretedPoses {
@@ -81,7 +83,7 @@ impl<'a> PoseReader<'a> {
     /// A malformed file; poses of a body without its mount; frames and poses that cannot be
     /// associated; frames whose times do not increase.
     pub fn read(&self, path: &Path) -> Result<InterpretedPoses, SurveyError> {
-        let file = read_poses(path, self.section.format)?;
+        let file = read_poses_with(path, &self.section.file_options())?;
         let mut convention = Convention::of(file.format);
         convention.direction = self.section.convention.unwrap_or(convention.direction);
         convention.axes = self.section.camera_axes.unwrap_or(convention.axes);
@@ -134,7 +136,11 @@ impl<'a> PoseReader<'a> {
                 });
             }
         }
-        let read = InterpretedPoses { given, convention };
+        let read = InterpretedPoses {
+            given,
+            convention,
+            format: file.format,
+        };
         let read = match self.section.unit_m {
             Some(unit_m) => read.in_unit(unit_m),
             None => read,

@@ -7,7 +7,7 @@ use super::pose_validation::feasible_conventions;
 use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
 use tunnelstitch_geometry::surface::Surface;
-use tunnelstitch_geometry::trajectory::{Convention, Pose, StampedPose, Trajectory};
+use tunnelstitch_geometry::trajectory::{Convention, Pose, PoseFormat, StampedPose, Trajectory};
 
 /// Units that positions may be given in instead of metres: their names, and their lengths, metres.
 const UNITS: [(&str, f64); 3] = [
@@ -74,10 +74,11 @@ impl Survey {
                 ..PoseReading::of_poses(flags.join(" and "), given.in_convention(&convention))
             });
         }
-        let mut others = vec![(
-            "quaternions as w x y z (quaternion = \"wxyz\" under [poses])".to_owned(),
-            given.changed(|pose| with_w_first(&pose)),
-        )];
+        let mut others = Vec::new();
+        if section.quaternion.is_none() && given.format == PoseFormat::Tum {
+            let remedy = "quaternions as w x y z (quaternion = \"wxyz\" under [poses])";
+            others.push((remedy.to_owned(), given.changed(|pose| with_w_first(&pose))));
+        }
         if section.reversed.is_none() {
             let remedy = "the poses in reverse order (reversed = true under [poses])";
             others.push((remedy.to_owned(), given.reversed()));
@@ -130,6 +131,7 @@ impl InterpretedPoses {
         Self {
             given: given.collect(),
             convention: self.convention,
+            format: self.format,
         }
     }
 
@@ -152,6 +154,7 @@ impl InterpretedPoses {
         Self {
             given: given.collect(),
             convention: self.convention,
+            format: self.format,
         }
     }
 }

@@ -3,7 +3,9 @@
 use super::associate::Associate;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-use tunnelstitch_geometry::trajectory::{CameraAxes, Direction, PoseFormat};
+use tunnelstitch_geometry::trajectory::{
+    CameraAxes, ColumnMap, Direction, DuplicateTimes, PoseFileOptions, PoseFormat, QuaternionOrder,
+};
 
 /// `[poses]`. Defaults are detected from the files' content or given by the conventions of their
 /// formats.
@@ -18,6 +20,12 @@ pub struct PosesSection {
     /// The files' format.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub format: Option<PoseFormat>,
+    /// Names of columns in the headers of CSV files, for columns whose names are not known.
+    #[serde(default, skip_serializing_if = "ColumnMap::is_empty")]
+    pub columns: ColumnMap,
+    /// The order of the quaternion's numbers in TUM files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quaternion: Option<QuaternionOrder>,
     /// The direction of the poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub convention: Option<Direction>,
@@ -60,6 +68,20 @@ impl PosesSection {
         Self {
             initial: initial.into(),
             ..Self::default()
+        }
+    }
+
+    /// The options for reading the files. A pose that is there twice is read once if poses are
+    /// associated with frames by time.
+    pub(super) fn file_options(&self) -> PoseFileOptions {
+        PoseFileOptions {
+            format: self.format,
+            columns: self.columns.clone(),
+            quaternion: self.quaternion,
+            duplicate_times: match self.associate {
+                Some(Associate::Time) => DuplicateTimes::Merge,
+                Some(Associate::Order | Associate::Name) | None => DuplicateTimes::Refuse,
+            },
         }
     }
 }

@@ -2,14 +2,20 @@
 
 use super::error::PoseError;
 use super::format::PoseFormat;
-use super::{colmap, csv, euroc, kitti, text, tum};
+use super::pose_options::PoseFileOptions;
+use super::quaternion_order::QuaternionOrder;
+use super::{colmap, csv, euroc, kitti, row, text, tum};
 use std::path::Path;
 
 /// Detects the format of a pose file from its content.
 ///
 /// # Errors
 /// A text in none of the formats.
-pub(super) fn detect_format(path: &Path, text: &str) -> Result<PoseFormat, PoseError> {
+pub(super) fn detect_format(
+    path: &Path,
+    text: &str,
+    options: &PoseFileOptions,
+) -> Result<PoseFormat, PoseError> {
     if text.trim_start().starts_with('{') {
         return Ok(PoseFormat::Nerfstudio);
     }
@@ -17,16 +23,21 @@ pub(super) fn detect_format(path: &Path, text: &str) -> Result<PoseFormat, PoseE
         // Only comments.
         return Err(PoseError::file(path, "holds no poses"));
     };
-    if csv::is_header(line) {
-        return Ok(PoseFormat::Csv);
-    }
-    if euroc::is_line(line) {
+    let order = options
+        .quaternion
+        .or_else(|| QuaternionOrder::of_comments(text));
+    // EuRoC's own header is a comment.
+    let is_euroc = euroc::is_line(line) && order != Some(QuaternionOrder::Xyzw);
+    if is_euroc && options.columns.is_empty() {
         return Ok(PoseFormat::Euroc);
+    }
+    if csv::Header::find(text, &options.columns).is_some() {
+        return Ok(PoseFormat::Csv);
     }
     if colmap::is_line(line) {
         return Ok(PoseFormat::Colmap);
     }
-    let words: Vec<&str> = line.split_whitespace().collect();
+    let words = row::words(line).map_err(|what| PoseError::line(path, number, what))?;
     let numbers = words
         .iter()
         .filter(|word| word.parse::<f64>().is_ok())

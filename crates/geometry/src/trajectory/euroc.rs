@@ -3,6 +3,7 @@
 //! The first eight columns count; velocities and biases may follow. Read only. Source: Burri et
 //! al., "The EuRoC micro aerial vehicle datasets", 2016.
 
+use super::entry_list::DuplicateTimes;
 use super::error::PoseError;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
@@ -22,11 +23,15 @@ pub(super) fn is_line(line: &str) -> bool {
         && words.count() >= 7
 }
 
-pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
-    text::stamped_lines(path, text, parse_line)
+pub(super) fn parse(
+    path: &Path,
+    text: &str,
+    duplicates: DuplicateTimes,
+) -> Result<Vec<PoseEntry>, PoseError> {
+    text::stamped_lines(path, text, duplicates, parse_line)
 }
 
-fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {
+fn parse_line(line: &str) -> Result<PoseEntry, String> {
     let words: Vec<&str> = line.split(',').map(str::trim).collect();
     let [time, pose @ ..] = words.as_slice() else {
         return Err(format!("no columns where `{FORM}` has 8"));
@@ -35,7 +40,6 @@ fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {
         return Err(format!("{} columns where `{FORM}` has 8", words.len()));
     }
     let time_s = times::from_nanoseconds(time)?;
-    text::check_increasing(time_s, last_s)?;
     let mut values = [0.0; 7];
     for (value, word) in values.iter_mut().zip(pose) {
         *value = text::number(word, FORM)?;

@@ -157,7 +157,7 @@ fn a_truncated_file_has_no_wrong_poses() {
 #[test]
 fn what_is_no_text_is_refused() {
     for bytes in [
-        &[0xff, 0xfe, 0x30, 0x00][..],
+        &[0xff, 0xfe, 0x30][..],
         b"0 0 0 0 0 0 0 1\0\n",
         &[0x89, b'P', b'N', b'G'],
     ] {
@@ -200,6 +200,173 @@ fn columns_are_found_by_their_names() {
         let file = read_text(&format!("{header}{time},1,2,3,1,0,0,0\n")).unwrap();
         assert_eq!(file.entries[0].time_s, Some(time_s));
     }
+}
+
+/// Two poses, as every file of the tests below has them.
+fn assert_two_poses(text: &str, options: &PoseFileOptions, format: PoseFormat) {
+    let (_dir, path) = file_of(text.as_bytes());
+    let file = read_poses_with(&path, options).unwrap_or_else(|error| panic!("{text}: {error}"));
+    assert_eq!(file.format, format, "{text}");
+    let expected = [[1.5, 0.25, -2.0], [2.5, 0.5, -1.0]];
+    assert_eq!(file.entries.len(), 2, "{text}");
+    for (entry, t) in file.entries.iter().zip(expected) {
+        assert_eq!(entry.pose.t_wc, Vector3::from(t), "{text}");
+        let q = entry.pose.r_wc;
+        assert!(
+            (q.w - 0.6).abs() < 1e-12 && (q.k - 0.8).abs() < 1e-12,
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn rows_without_a_header_have_any_separator_and_order() {
+    let rows = ["0 1.5 0.25 -2 0 0 0.8 0.6", "1 2.5 0.5 -1 0 0 0.8 0.6"];
+    let w_first = ["0 1.5 0.25 -2 0.6 0 0 0.8", "1 2.5 0.5 -1 0.6 0 0 0.8"];
+    let kitti = [
+        "-0.28 -0.96 0 1.5 0.96 -0.28 0 0.25 0 0 1 -2",
+        "-0.28 -0.96 0 2.5 0.96 -0.28 0 0.5 0 0 1 -1",
+    ];
+    let options = PoseFileOptions::default();
+    let with_order = PoseFileOptions {
+        quaternion: Some(QuaternionOrder::Wxyz),
+        ..PoseFileOptions::default()
+    };
+    for separator in [",", ", ", ";", "\t", "  "] {
+        let joined = |rows: [&str; 2]| rows.join("\n").replace(' ', separator);
+        assert_two_poses(&joined(rows), &options, PoseFormat::Tum);
+        assert_two_poses(&joined(kitti), &options, PoseFormat::Kitti);
+        assert_two_poses(&joined(w_first), &with_order, PoseFormat::Tum);
+        for comment in ["# time tx ty tz qw qx qy qz\n", "#t x y z w x y z\n\n"] {
+            let text = format!("{comment}{}", joined(w_first));
+            assert_two_poses(&text, &options, PoseFormat::Tum);
+        }
+    }
+    // A comment with the names of all columns, separated as these are, is a header.
+    let text = format!(
+        "# time,qw,qx,qy,qz,x,y,z\n{}\n",
+        "0,0.6,0,0,0.8,1.5,0.25,-2"
+    );
+    let text = format!("{text}1,0.6,0,0,0.8,2.5,0.5,-1\n");
+    assert_two_poses(&text, &options, PoseFormat::Csv);
+}
+
+#[test]
+fn tables_of_spreadsheets_and_of_ros_are_read() {
+    let options = PoseFileOptions::default();
+    let ros = "field.pose.position.x,field.pose.position.y,field.pose.position.z,\
+               field.pose.orientation.x,field.pose.orientation.y,field.pose.orientation.z,\
+               field.pose.orientation.w\n\
+               1403636579763555584,7,1.5,0.25,-2,0,0,0.8,0.6\n\
+               1403636579863555584,8,2.5,0.5,-1,0,0,0.8,0.6\n";
+    let plotted = ros
+        .replace("field.", "/odom/")
+        .replace("pose.", "pose/pose/");
+    let decimal = "time_s;tx;ty;tz;qx;qy;qz;qw\r\n0,5;1,5;0,25;-2,0;0;0;0,8;0,6\r\n\
+                   0,75;2,5;0,5;-1;0,0;0;0,8;0,6\r\n";
+    let euroc = "timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], \
+                 q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]\n\
+                 1,1.5,0.25,-2,0.6,0,0,0.8,9\n2,2.5,0.5,-1,0.6,0,0,0.8,9\n";
+    for text in [
+        format!("%time,field.header.seq,{ros}"),
+        format!("header.stamp.secs,header.stamp.nsecs,{ros}").replace(",7,", ",70,"),
+        format!("__time,/odom/header/seq,{plotted}"),
+        decimal.to_owned(),
+        format!("sep=;\r\n{decimal}"),
+        format!("\u{feff}\"sep=;\"\r\n{decimal}"),
+        decimal.replace(';', "\t"),
+        euroc.to_owned(),
+    ] {
+        assert_two_poses(&text, &options, PoseFormat::Csv);
+    }
+    // UTF-16 as of `Unicode Text`.
+    let bytes: Vec<u8> = format!("\u{feff}{}", decimal.replace(';', "\t"))
+        .encode_utf16()
+        .flat_map(u16::to_le_bytes)
+        .collect();
+    let file = read_poses(&file_of(&bytes).1, None).unwrap();
+    assert_eq!(file.entries[1].time_s, Some(0.75));
+    // Where commas separate, they are no decimal commas.
+    let quoted = "time_s,tx,ty,tz,qx,qy,qz,qw\n0,\"1,5\",0,0,0,0,0,1\n";
+    let message = read_text(quoted).unwrap_err().to_string();
+    assert!(message.contains(":2: `1,5` is not a number"), "{message}");
+}
+
+#[test]
+fn columns_of_other_names_are_those_that_the_user_names() {
+    let columns = [
+        (PoseColumn::TimeS, "when"),
+        (PoseColumn::Tx, "east"),
+        (PoseColumn::Ty, "north"),
+        (PoseColumn::Tz, "up"),
+    ];
+    let options = PoseFileOptions {
+        columns: columns
+            .map(|(column, name)| (column, name.to_owned()))
+            .into(),
+        ..PoseFileOptions::default()
+    };
+    let text = "when;up;north;east;x;y;z;qx;qy;qz;qw\n\
+                1;-2;0.25;1.5;9;9;9;0;0;0.8;0.6\n2;-1;0.5;2.5;9;9;9;0;0;0.8;0.6\n";
+    assert_two_poses(text, &options, PoseFormat::Csv);
+    let (_dir, path) = file_of(text.replace("north", "south").as_bytes());
+    let message = read_poses_with(&path, &options).unwrap_err().to_string();
+    for part in [":1: no column `north`", "for ty", "`up`, `south`, `east`"] {
+        assert!(message.contains(part), "{message}");
+    }
+    let message = read_text(&text.replace(";y;", ";why;"))
+        .unwrap_err()
+        .to_string();
+    for part in [
+        "no column `ty_m` or `ty`",
+        "`x`, `why`, `z`",
+        "columns = { ty =",
+    ] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn times_of_many_digits_are_nanoseconds_in_tum() {
+    for word in [
+        "1403636579763555584",
+        "1403636579763555584.000000",
+        "1.403636579763555584e+18",
+    ] {
+        let file = read_text(&format!("{word} 0 0 0 0 0 0 1\n")).unwrap();
+        assert_eq!(file.format, PoseFormat::Tum);
+        assert_eq!(file.entries[0].time_s, Some(1403636579.7635555));
+    }
+    // With commas these would be EuRoC's, whose order is another.
+    let comma = "1403636579763555584,0,0,0,0.6,0,0,0.8\n";
+    assert_eq!(read_text(comma).unwrap().format, PoseFormat::Euroc);
+    let named = read_text(&format!("# t tx ty tz qx qy qz qw\n{comma}")).unwrap();
+    assert_eq!(named.format, PoseFormat::Tum);
+}
+
+#[test]
+fn poses_of_one_time_are_merged_if_they_agree_and_are_wanted_by_time() {
+    let options = PoseFileOptions {
+        duplicate_times: DuplicateTimes::Merge,
+        ..PoseFileOptions::default()
+    };
+    let ns = "1403636580838555648,0,0,0,1,0,0,0\n";
+    for text in [
+        "0 0 0 0 0 0 0 1\n0 0 0 0.0005 0 0 0 1\n".to_owned(),
+        "time,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n0,0,0,0,0,0,0,1\n".to_owned(),
+        ns.repeat(2),
+    ] {
+        let (_dir, path) = file_of(text.as_bytes());
+        assert_eq!(read_poses_with(&path, &options).unwrap().entries.len(), 1);
+        let message = read_poses(&path, None).unwrap_err().to_string();
+        assert!(message.contains("duplicate timestamp"), "{message}");
+    }
+    let (_dir, path) = file_of(b"0 0 0 0 0 0 0 1\n\n0 0 0 0 0 0 0.02 1\n");
+    let message = read_poses_with(&path, &options).unwrap_err().to_string();
+    assert!(
+        message.contains("poses:3: ") && message.contains("lines 1 and 3"),
+        "{message}"
+    );
 }
 
 #[test]

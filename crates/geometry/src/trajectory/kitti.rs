@@ -7,7 +7,7 @@
 use super::error::PoseError;
 use super::pose_entry::PoseEntry;
 use super::stamped_pose::StampedPose;
-use super::{rigid, text};
+use super::{rigid, row, text};
 use std::path::Path;
 
 pub(super) const FORM: &str = "r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz";
@@ -19,7 +19,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
 }
 
 fn parse_line(line: &str) -> Result<PoseEntry, String> {
-    let [a, b, c, d, e, f, g, h, i, j, k, l] = text::numbers(line, FORM)?;
+    let [a, b, c, d, e, f, g, h, i, j, k, l] = row::numbers(line, FORM)?;
     Ok(PoseEntry {
         name: None,
         time_s: None,

@@ -2,7 +2,7 @@
 //!
 //! | format | its own convention | times | names |
 //! | --- | --- | --- | --- |
-//! | [`tum`] | camera-to-world, OpenCV's axes | seconds | |
+//! | [`tum`] | camera-to-world, OpenCV's axes | seconds or nanoseconds | |
 //! | [`kitti`] | camera-to-world, OpenCV's axes | | |
 //! | [`mod@csv`] | camera-to-world, OpenCV's axes | seconds or nanoseconds, if there | if there |
 //! | [`colmap`] | world-to-camera, OpenCV's axes | | yes |
@@ -30,6 +30,8 @@ pub mod colmap;
 mod convention;
 pub mod csv;
 mod detection;
+mod encoding;
+mod entry_list;
 mod error;
 mod euroc;
 mod format;
@@ -42,7 +44,10 @@ mod plan;
 mod pose;
 mod pose_entry;
 mod pose_file;
+mod pose_options;
+mod quaternion_order;
 mod rigid;
+mod row;
 pub mod se3;
 mod shutter;
 pub mod so3;
@@ -57,6 +62,8 @@ mod format_tests;
 
 pub use axes::{CameraAxes, Direction};
 pub use convention::Convention;
+pub use csv::{ColumnMap, PoseColumn};
+pub use entry_list::DuplicateTimes;
 pub use error::PoseError;
 pub use format::PoseFormat;
 pub use jitter::{Jitter, JitterModel, MAX_SEARCH_VOLUME_DEG3};
@@ -64,7 +71,9 @@ pub use mount::read_camera_in_body;
 pub use plan::{Mounting, PlanTable, Rate, Station, UniformMotion, spiral};
 pub use pose::Pose;
 pub use pose_entry::PoseEntry;
-pub use pose_file::{PoseFile, read_poses};
+pub use pose_file::{PoseFile, read_poses, read_poses_with};
+pub use pose_options::PoseFileOptions;
+pub use quaternion_order::QuaternionOrder;
 pub use shutter::Shutter;
 pub use stamped_pose::{StampedPose, Trajectory, indexed, poses_of};
 pub use tunnel_frame::{TunnelAxis, read_tunnel_frame};

@@ -2,7 +2,7 @@
 
 use super::error::PoseError;
 use super::pose::Pose;
-use super::{rigid, text};
+use super::{rigid, row, text};
 use std::path::Path;
 
 /// Keys of calibration files with such a matrix; true if the matrix maps camera to body
@@ -46,7 +46,7 @@ pub fn read_camera_in_body(path: &Path) -> Result<Pose, PoseError> {
 pub(super) fn read_matrix(path: &Path, text: &str) -> Result<Pose, PoseError> {
     let mut rows = Vec::new();
     for (number, line) in text::lines(text) {
-        let row = text::numbers(&line.replace(',', " "), "four numbers a row")
+        let row = row::numbers(line, "four numbers a row")
             .map_err(|what| PoseError::line(path, number, what))?;
         rows.push(row);
     }

@@ -4,6 +4,7 @@ use super::detection::detect_format;
 use super::error::PoseError;
 use super::format::PoseFormat;
 use super::pose_entry::PoseEntry;
+use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
 use super::{colmap, csv, euroc, kitti, nerfstudio, text, tum};
 use std::path::{Path, PathBuf};
@@ -48,25 +49,37 @@ impl PoseFile {
 /// [`PoseError`]: an unreadable file, an unknown format, a line that is no pose, times that do not
 /// increase, two poses of one frame, no pose at all.
 pub fn read_poses(path: &Path, format: Option<PoseFormat>) -> Result<PoseFile, PoseError> {
+    let options = PoseFileOptions {
+        format,
+        ..PoseFileOptions::default()
+    };
+    read_poses_with(path, &options)
+}
+
+/// Reads a file of poses with options. A folder is a COLMAP model.
+///
+/// # Errors
+/// Those of [`read_poses`]; a column that `options` names and the file has not.
+pub fn read_poses_with(path: &Path, options: &PoseFileOptions) -> Result<PoseFile, PoseError> {
     let path = if path.is_dir() {
         path.join(colmap::IMAGES_FILE)
     } else {
         path.to_owned()
     };
     let text = text::read(&path)?;
-    let format = match format {
+    let format = match options.format {
         Some(format) => format,
-        None => detect_format(&path, &text)?,
+        None => detect_format(&path, &text, options)?,
     };
-    let parse = match format {
-        PoseFormat::Tum => tum::parse,
-        PoseFormat::Kitti => kitti::parse,
-        PoseFormat::Csv => csv::parse,
-        PoseFormat::Colmap => colmap::parse,
-        PoseFormat::Nerfstudio => nerfstudio::parse,
-        PoseFormat::Euroc => euroc::parse,
-    };
-    let entries = parse(&path, &text)?;
+    let duplicates = options.duplicate_times;
+    let entries = match format {
+        PoseFormat::Tum => tum::parse(&path, &text, options.quaternion, duplicates),
+        PoseFormat::Kitti => kitti::parse(&path, &text),
+        PoseFormat::Csv => csv::parse(&path, &text, &options.columns, duplicates),
+        PoseFormat::Colmap => colmap::parse(&path, &text),
+        PoseFormat::Nerfstudio => nerfstudio::parse(&path, &text),
+        PoseFormat::Euroc => euroc::parse(&path, &text, duplicates),
+    }?;
     if entries.is_empty() {
         return Err(PoseError::file(&path, "holds no poses"));
     }

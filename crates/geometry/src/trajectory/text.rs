@@ -1,30 +1,29 @@
-//! Elements of all text formats: lines, numbers, quaternions and increasing times.
+//! Elements of all text formats: lines, numbers, times, quaternions and names.
 
+use super::encoding::decode;
+use super::entry_list::{DuplicateTimes, EntryList};
 use super::error::PoseError;
 use super::pose_entry::PoseEntry;
+use super::times;
 use crate::files::limits::MAX_TABLE_BYTES;
 use crate::files::read_regular;
 use nalgebra::{Quaternion, UnitQuaternion};
+use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::Path;
 
-/// Reads a text file and removes its byte order mark.
+/// Reads a text file of UTF-8, or of UTF-16 with a byte order mark, and removes that mark.
 ///
 /// # Errors
-/// An unreadable file, or one that is not UTF-8 text.
+/// An unreadable file, or one that is no such text.
 pub fn read(path: &Path) -> Result<String, PoseError> {
     let bytes = read_regular(path, MAX_TABLE_BYTES).map_err(|source| PoseError::Read {
         path: path.to_owned(),
         source,
     })?;
-    let text = String::from_utf8(bytes)
-        .ok()
-        .filter(|text| !text.contains('\0'))
-        .ok_or_else(|| PoseError::file(path, "is not UTF-8 text"))?;
-    match text.strip_prefix('\u{feff}') {
-        Some(rest) => Ok(rest.to_owned()),
-        None => Ok(text),
-    }
+    decode(&bytes).ok_or_else(|| {
+        PoseError::file(path, "is not UTF-8 text, nor UTF-16 with a byte order mark")
+    })
 }
 
 /// The lines with content and their 1-based numbers; blank lines and comments that begin with `#`
@@ -36,20 +35,20 @@ pub fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
-/// Parses the pose of each line with content; `parse_line` receives the line and the time of the
-/// previous pose.
+/// Parses the pose of each line with content.
 pub(super) fn stamped_lines(
     path: &Path,
     text: &str,
-    parse_line: impl Fn(&str, Option<f64>) -> Result<PoseEntry, String>,
+    duplicates: DuplicateTimes,
+    parse_line: impl Fn(&str) -> Result<PoseEntry, String>,
 ) -> Result<Vec<PoseEntry>, PoseError> {
-    let mut entries: Vec<PoseEntry> = Vec::new();
+    let mut entries = EntryList::new(duplicates);
     for (number, line) in lines(text) {
-        let last_s = entries.last().and_then(|entry| entry.time_s);
-        let entry = parse_line(line, last_s).map_err(|what| PoseError::line(path, number, what))?;
-        entries.push(entry);
+        parse_line(line)
+            .and_then(|entry| entries.push(number, entry))
+            .map_err(|what| PoseError::line(path, number, what))?;
     }
-    Ok(entries)
+    Ok(entries.into_entries())
 }
 
 /// Parses a finite number; `form` describes the line for the error message.
@@ -69,14 +68,27 @@ pub fn finite(word: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("`{word}` is not a finite number"))
 }
 
-/// Parses exactly N blank-separated numbers; `form` describes them for the error message.
-pub fn numbers<const N: usize>(line: &str, form: &str) -> Result<[f64; N], String> {
-    let values = line
-        .split_whitespace()
-        .map(|word| number(word, form))
-        .collect::<Result<Vec<f64>, String>>()?;
-    let count = values.len();
-    <[f64; N]>::try_from(values).map_err(|_| format!("{count} columns where `{form}` has {N}"))
+/// Parses a time, seconds; whole numbers of 16 digits and more are nanoseconds. `form` describes
+/// the line for the error message.
+pub(super) fn time(word: &str, form: &str) -> Result<f64, String> {
+    number(word, form)?;
+    times::from_word(word)
+        .ok_or_else(|| format!("`{word}` is not a time; give seconds, or whole nanoseconds"))
+}
+
+/// The number with a decimal point instead of a decimal comma, which it may have where commas do
+/// not separate.
+pub(super) fn with_decimal_point(word: &str, separator: u8) -> Cow<'_, str> {
+    match word.split_once(',') {
+        Some((whole, fraction)) if separator != b',' && !word.contains('.') => {
+            let number = format!("{whole}.{fraction}");
+            if number.parse::<f64>().is_ok() {
+                return Cow::Owned(number);
+            }
+            Cow::Borrowed(word)
+        }
+        _ => Cow::Borrowed(word),
+    }
 }
 
 /// The rotation of a quaternion; `order` is the order of its numbers in the file, for the error
@@ -102,19 +114,6 @@ pub fn rotation([w, x, y, z]: [f64; 4], order: &str) -> Result<UnitQuaternion<f6
         return Ok(UnitQuaternion::new_unchecked(quaternion));
     }
     Ok(UnitQuaternion::from_quaternion(quaternion))
-}
-
-/// Checks that times increase.
-pub fn check_increasing(time_s: f64, last_s: Option<f64>) -> Result<(), String> {
-    match last_s {
-        Some(last) if time_s == last => Err(format!(
-            "duplicate timestamp {time_s}: every pose needs a time of its own"
-        )),
-        Some(last) if time_s < last => Err(format!(
-            "timestamp {time_s} after {last}: sort the file by time"
-        )),
-        _ => Ok(()),
-    }
 }
 
 /// The set of frame names read so far, to reject duplicates.

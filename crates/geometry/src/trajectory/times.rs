@@ -4,13 +4,16 @@
 /// have 19 digits from 2001 on, and no clock counts that many seconds.
 pub const MIN_NANOSECOND_DIGITS: usize = 16;
 
-/// Converts a whole number of nanoseconds to seconds.
+/// Smallest number with so many digits.
+const MIN_NANOSECONDS: f64 = 1e15;
+
+/// Converts a whole number of nanoseconds to seconds; it may have decimals that are zeros, and an
+/// exponent.
 ///
 /// A double holds times since 1970 to a quarter of a microsecond.
 pub fn from_nanoseconds(word: &str) -> Result<f64, String> {
-    let nanoseconds: i64 = word
-        .parse()
-        .map_err(|_| format!("`{word}` is not a whole number of nanoseconds"))?;
+    let nanoseconds = whole_number(word)
+        .ok_or_else(|| format!("`{word}` is not a whole number of nanoseconds"))?;
     let (seconds, rest) = (
         nanoseconds.div_euclid(1_000_000_000),
         nanoseconds.rem_euclid(1_000_000_000),
@@ -18,14 +21,44 @@ pub fn from_nanoseconds(word: &str) -> Result<f64, String> {
     Ok(seconds as f64 + rest as f64 * 1e-9)
 }
 
-/// Converts a number to seconds: whole numbers of 16 digits and more are nanoseconds, everything
-/// else is seconds. `None` if it is not a finite number.
+/// Converts a number to seconds: numbers of 16 digits and more before the decimal point are
+/// nanoseconds, everything else is seconds. `None` if it is not a finite number.
 pub fn from_word(word: &str) -> Option<f64> {
     let is_whole = !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
     if is_whole && word.len() >= MIN_NANOSECOND_DIGITS {
         return from_nanoseconds(word).ok();
     }
-    word.parse::<f64>().ok().filter(|time_s| time_s.is_finite())
+    let number = word.parse::<f64>().ok().filter(|value| value.is_finite())?;
+    if number < MIN_NANOSECONDS {
+        return Some(number);
+    }
+    let is_countable = number <= i64::MAX as f64;
+    let rounded = is_countable.then_some(number * 1e-9);
+    from_nanoseconds(word).ok().or(rounded)
+}
+
+/// The whole number that a text such as `15`, `15.00` or `1.5e1` has exactly.
+fn whole_number(word: &str) -> Option<i64> {
+    let (mantissa, exponent) = match word.split_once(['e', 'E']) {
+        Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),
+        None => (word, 0),
+    };
+    let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let has_digits = mantissa.bytes().any(|byte| byte.is_ascii_digit());
+    if !(has_digits && decimals.bytes().all(|byte| byte.is_ascii_digit())) {
+        return None;
+    }
+    let decimals = decimals.trim_end_matches('0');
+    let zeros = usize::try_from(exponent)
+        .ok()?
+        .checked_sub(decimals.len())?;
+    // More digits than an i64 has.
+    if zeros > 19 {
+        return None;
+    }
+    format!("{whole}{decimals}{}", "0".repeat(zeros))
+        .parse()
+        .ok()
 }
 
 /// The time in a file's name (without its extension): its last number, if that has a decimal point
@@ -56,6 +89,24 @@ mod tests {
         assert_eq!(from_word("99999999999999999999999"), None);
         assert_eq!(from_nanoseconds("-500000000"), Ok(-0.5));
         assert!(from_nanoseconds("1.5").is_err());
+        assert!(from_nanoseconds("e5").is_err());
+    }
+
+    #[test]
+    fn nanoseconds_may_have_decimals_and_an_exponent() {
+        let time_s = from_word("1403636579763555584");
+        for word in [
+            "1403636579763555584.000000",
+            "1.403636579763555584e+18",
+            "1.403636579763555584000000E18",
+        ] {
+            assert_eq!(from_word(word), time_s, "{word}");
+            assert_eq!(from_nanoseconds(word).ok(), time_s, "{word}");
+        }
+        let near_s = from_word("1403636579763555584.25").unwrap();
+        assert!((near_s - time_s.unwrap()).abs() < 1e-6);
+        assert_eq!(from_word("1.5e30"), None);
+        assert_eq!(from_word("1e999999999"), None);
     }
 
     #[test]

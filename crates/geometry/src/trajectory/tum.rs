@@ -1,14 +1,20 @@
 //! TUM: lines `time tx ty tz qx qy qz qw`, seconds and metres, camera-to-world.
 //!
+//! Times of 16 digits and more are nanoseconds, as ORB-SLAM3 writes them. Commas, semicolons and
+//! tabs may separate, and a comment before the first pose may name `qw` first.
+//!
 //! The program's own format. It is written with eight columns, single spaces and no trailing space,
 //! as `evo` requires.
 
+use super::entry_list::DuplicateTimes;
 use super::error::PoseError;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
+use super::quaternion_order::QuaternionOrder;
 use super::stamped_pose::{StampedPose, Trajectory};
-use super::text;
+use super::{row, text};
 use nalgebra::Vector3;
+use std::borrow::Cow;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -21,7 +27,7 @@ pub(super) const FORM: &str = "time tx ty tz qx qy qz qw";
 /// quaternion of length zero (or farther than 1 % from unit length); times that do not increase; no
 /// pose at all.
 pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
-    let entries = parse(path, &text::read(path)?)?;
+    let entries = parse(path, &text::read(path)?, None, DuplicateTimes::Refuse)?;
     if entries.is_empty() {
         return Err(PoseError::file(path, "holds no poses"));
     }
@@ -32,18 +38,34 @@ pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
     Ok(entries.into_iter().map(stamped).collect())
 }
 
-pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
-    text::stamped_lines(path, text, parse_line)
+/// Parses a TUM file; without an `order` of the quaternion, the comments before the first pose name
+/// it, or it is TUM's own.
+pub(super) fn parse(
+    path: &Path,
+    text: &str,
+    order: Option<QuaternionOrder>,
+    duplicates: DuplicateTimes,
+) -> Result<Vec<PoseEntry>, PoseError> {
+    let order = order
+        .or_else(|| QuaternionOrder::of_comments(text))
+        .unwrap_or_default();
+    text::stamped_lines(path, text, duplicates, |line| parse_line(line, order))
 }
 
-fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {
-    let [time_s, tx, ty, tz, qx, qy, qz, qw] = text::numbers(line, FORM)?;
-    text::check_increasing(time_s, last_s)?;
-    let rotation = text::rotation([qw, qx, qy, qz], "qx qy qz qw")?;
+fn parse_line(line: &str, order: QuaternionOrder) -> Result<PoseEntry, String> {
+    let [time, pose @ ..]: [Cow<'_, str>; 8] = row::exact_words(line, FORM)?;
+    let mut values = [0.0; 7];
+    for (value, word) in values.iter_mut().zip(&pose) {
+        *value = text::number(word, FORM)?;
+    }
+    let [tx, ty, tz, a, b, c, d] = values;
     Ok(PoseEntry {
         name: None,
-        time_s: Some(time_s),
-        pose: Pose::new(rotation, Vector3::new(tx, ty, tz)),
+        time_s: Some(text::time(&time, FORM)?),
+        pose: Pose::new(
+            text::rotation(order.wxyz([a, b, c, d]), order.columns())?,
+            Vector3::new(tx, ty, tz),
+        ),
     })
 }
 

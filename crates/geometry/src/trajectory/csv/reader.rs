@@ -1,0 +1,159 @@
+//! Reading of CSV files of poses.
+
+use super::cells::name_from_cell;
+use super::columns::{Columns, FORM, TimeColumn};
+use super::header::Header;
+use super::pose_column::ColumnMap;
+use super::table::split;
+use crate::trajectory::entry_list::{DuplicateTimes, EntryList};
+use crate::trajectory::error::PoseError;
+use crate::trajectory::pose::Pose;
+use crate::trajectory::pose_entry::PoseEntry;
+use crate::trajectory::{text, times};
+use csv::StringRecord;
+use nalgebra::Vector3;
+use std::borrow::Cow;
+use std::path::Path;
+
+pub(in crate::trajectory) fn parse(
+    path: &Path,
+    text: &str,
+    map: &ColumnMap,
+    duplicates: DuplicateTimes,
+) -> Result<Vec<PoseEntry>, PoseError> {
+    let Some(header) = Header::find(text, map).or_else(|| Header::first_line(text)) else {
+        return Ok(Vec::new());
+    };
+    let fail = |number: usize| move |what: String| PoseError::line(path, number, what);
+    let titles = split(header.line, header.separator).map_err(fail(header.number))?;
+    let row = RowReader {
+        columns: Columns::of(&titles, map).map_err(fail(header.number))?,
+        count: titles.len(),
+        separator: header.separator,
+    };
+    let mut entries = EntryList::new(duplicates);
+    let mut names = text::Names::default();
+    for (number, line) in header.records(text) {
+        row.read(line)
+            .and_then(|entry| {
+                entry
+                    .name
+                    .as_deref()
+                    .map_or(Ok(()), |name| names.add(name))?;
+                entries.push(number, entry)
+            })
+            .map_err(fail(number))?;
+    }
+    Ok(entries.into_entries())
+}
+
+/// A reader of the rows of a table.
+struct RowReader {
+    columns: Columns,
+    /// Number of columns.
+    count: usize,
+    separator: u8,
+}
+
+impl RowReader {
+    /// Reads the pose of a row.
+    fn read(&self, line: &str) -> Result<PoseEntry, String> {
+        let record = split(line, self.separator)?;
+        if record.len() != self.count {
+            return Err(format!(
+                "{} columns where the first line names {}",
+                record.len(),
+                self.count
+            ));
+        }
+        let mut values = [0.0; 7];
+        for (value, column) in values.iter_mut().zip(self.columns.pose) {
+            *value = text::number(&self.number_in(&record, column), FORM)?;
+        }
+        let [tx, ty, tz, qx, qy, qz, qw] = values;
+        let name = self
+            .columns
+            .name
+            .map(|column| record.get(column).unwrap_or_default());
+        if name == Some("") {
+            return Err("the frame has no name".to_owned());
+        }
+        Ok(PoseEntry {
+            name: name.map(|name| name_from_cell(name).to_owned()),
+            time_s: self.time(&record)?,
+            pose: Pose::new(
+                text::rotation([qw, qx, qy, qz], "as the columns' names say")?,
+                Vector3::new(tx, ty, tz),
+            ),
+        })
+    }
+
+    /// The time of a row, if there are times.
+    fn time(&self, record: &StringRecord) -> Result<Option<f64>, String> {
+        let Some(columns) = self.columns.time else {
+            return Ok(None);
+        };
+        let word = |column| self.number_in(record, column);
+        Ok(Some(match columns {
+            TimeColumn::Seconds(column) => text::time(&word(column), FORM)?,
+            TimeColumn::Nanoseconds(column) => times::from_nanoseconds(&word(column))?,
+            TimeColumn::Parts(seconds, nanoseconds) => {
+                text::number(&word(seconds), FORM)? + times::from_nanoseconds(&word(nanoseconds))?
+            }
+        }))
+    }
+
+    /// The number in a column, with a decimal point.
+    fn number_in<'a>(&self, record: &'a StringRecord, column: usize) -> Cow<'a, str> {
+        text::with_decimal_point(record.get(column).unwrap_or_default(), self.separator)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trajectory::csv::format;
+    use crate::trajectory::stamped_pose::StampedPose;
+
+    fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
+        super::parse(path, text, &ColumnMap::new(), DuplicateTimes::Refuse)
+    }
+
+    #[test]
+    fn any_name_of_a_frame_comes_back() {
+        let names = [
+            "a\n\"q\",.png",
+            "=HYPERLINK(1).png",
+            "'=x",
+            "'plain",
+            "-1",
+            "# x",
+            "\u{1b}[m",
+            " a ",
+            "' a ",
+            "'b '",
+            "=1 ",
+            "\tc",
+        ];
+        let names = names.map(str::to_owned);
+        let pose = Pose::identity();
+        let trajectory: Vec<StampedPose> = (0..names.len())
+            .map(|k| StampedPose {
+                time_s: k as f64,
+                pose,
+            })
+            .collect();
+        let text = format(&names, &trajectory);
+        assert!(!text.contains("\n=") && !text.contains("\n-"), "{text}");
+        let read = parse(Path::new("p.csv"), &text).unwrap();
+        let read: Vec<String> = read.into_iter().filter_map(|entry| entry.name).collect();
+        assert_eq!(read, names);
+    }
+
+    #[test]
+    fn a_quote_that_is_never_closed_is_an_error_of_its_line() {
+        let text = format!("# poses\n{FORM}\n\"a,0,0,0,0,0,0,0,1\nb,1,0,0,0,0,0,0,1\n");
+        let error = parse(Path::new("p.csv"), &text).unwrap_err().to_string();
+        assert!(error.starts_with("p.csv:3: "), "{error}");
+    }
+}

@@ -1,0 +1,168 @@
+//! Names that this program, ROS and EuRoC give to the columns of poses.
+
+use super::pose_column::PoseColumn;
+
+const FRAME: &[&str] = &[
+    "frame",
+    "name",
+    "file",
+    "filename",
+    "file_name",
+    "image",
+    "image_name",
+];
+/// Names of times, best first: the stamp of a message of ROS is the camera's, its `%time` may be
+/// that of the recording.
+const TIMES: [&[&str]; 3] = [
+    &["header_stamp", "field_header_stamp"],
+    &["time_s", "time", "timestamp", "timestamp_s"],
+    &["stamp", "t", "rosbagtimestamp"],
+];
+const TIMES_NS: &[&str] = &["time_ns", "timestamp_ns"];
+/// Words before an axis in the names of translations and rotations, as in
+/// `pose.pose.position.x`.
+const TRANSLATIONS: &[&str] = &["position", "translation", "pos"];
+const ROTATIONS: &[&str] = &["orientation", "rotation", "quaternion", "quat"];
+
+/// The title of a column: its name in lower case, with `_` for other separators of words, and its
+/// unit.
+pub(super) struct Title {
+    name: String,
+    unit: String,
+}
+
+impl Title {
+    /// The title that a cell of a header holds, such as `p_RS_R_x [m]` or `%time`.
+    pub fn of(text: &str) -> Self {
+        let text = text.trim().to_lowercase();
+        let in_brackets = |open, close| text.strip_suffix(close)?.rsplit_once(open);
+        let (name, unit) = in_brackets('[', ']')
+            .or_else(|| in_brackets('(', ')'))
+            .unwrap_or((text.as_str(), ""));
+        let is_mark = |c: char| "_%#".contains(c);
+        Self {
+            name: name
+                .trim()
+                .replace(['/', '.', ' ', '-'], "_")
+                .trim_matches(is_mark)
+                .to_owned(),
+            unit: unit.trim().to_owned(),
+        }
+    }
+
+    /// The rank of this title among those of a column, 0 for the one that is preferred; `None` if
+    /// it is that of another.
+    pub fn rank(&self, column: PoseColumn) -> Option<usize> {
+        let is = |names: &[&str]| names.contains(&self.name.as_str());
+        let has_unit = |units: &[&str]| units.contains(&self.unit.as_str());
+        match column {
+            PoseColumn::Frame => (is(FRAME) && has_unit(&[""])).then_some(0),
+            PoseColumn::TimeS if has_unit(&["", "s", "sec", "seconds"]) => {
+                TIMES.iter().position(|names| is(names))
+            }
+            PoseColumn::TimeNs if has_unit(&["ns"]) => TIMES.iter().position(|names| is(names)),
+            PoseColumn::TimeNs => (is(TIMES_NS) && has_unit(&[""])).then_some(0),
+            PoseColumn::TimeS => None,
+            PoseColumn::Tx => self.rank_of_translation("x"),
+            PoseColumn::Ty => self.rank_of_translation("y"),
+            PoseColumn::Tz => self.rank_of_translation("z"),
+            PoseColumn::Qx => self.rank_of_rotation("x"),
+            PoseColumn::Qy => self.rank_of_rotation("y"),
+            PoseColumn::Qz => self.rank_of_rotation("z"),
+            PoseColumn::Qw => self.rank_of_rotation("w"),
+        }
+    }
+
+    /// True for the seconds of a stamp whose nanoseconds are a column of their own.
+    pub fn is_stamp_seconds(&self) -> bool {
+        self.name.ends_with("stamp_secs") || self.name.ends_with("stamp_sec")
+    }
+
+    /// True for the nanoseconds of a stamp whose seconds are a column of their own.
+    pub fn is_stamp_nanoseconds(&self) -> bool {
+        ["stamp_nsecs", "stamp_nsec", "stamp_nanosec"]
+            .iter()
+            .any(|end| self.name.ends_with(end))
+    }
+
+    fn rank_of_translation(&self, axis: &str) -> Option<usize> {
+        if !["", "m", "metres", "meters"].contains(&self.unit.as_str()) {
+            return None;
+        }
+        let name = self.name.strip_suffix("_m").unwrap_or(&self.name);
+        if name == axis || name.strip_prefix('t') == Some(axis) {
+            return Some(0);
+        }
+        let is_other =
+            name.strip_prefix('p') == Some(axis) || self.is_axis_of(axis, 'p', TRANSLATIONS);
+        is_other.then_some(1)
+    }
+
+    fn rank_of_rotation(&self, axis: &str) -> Option<usize> {
+        if !["", "-", "1"].contains(&self.unit.as_str()) {
+            return None;
+        }
+        if self.name.strip_prefix('q') == Some(axis) {
+            return Some(0);
+        }
+        self.is_axis_of(axis, 'q', ROTATIONS).then_some(1)
+    }
+
+    /// True for names like `pose_position_x`, whose last word but one is one of `words`, and for
+    /// names like EuRoC's `p_rs_r_x`, whose first word is `letter`.
+    fn is_axis_of(&self, axis: &str, letter: char, words: &[&str]) -> bool {
+        let Some(rest) = self
+            .name
+            .strip_suffix(axis)
+            .and_then(|rest| rest.strip_suffix('_'))
+        else {
+            return false;
+        };
+        let first = rest.split('_').next();
+        let last = rest.rsplit('_').next();
+        first.is_some_and(|first| first.strip_prefix(letter) == Some(""))
+            || last.is_some_and(|last| words.contains(&last))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_ros_and_euroc_are_known() {
+        use PoseColumn::{Frame, Qw, Qx, TimeNs, TimeS, Tx, Ty, Tz};
+        for (text, column) in [
+            ("field.pose.position.x", Tx),
+            ("pose.position.y", Ty),
+            ("/pose/pose/position/z", Tz),
+            ("position_x", Tx),
+            ("transforms[0].transform.translation.x", Tx),
+            ("px", Tx),
+            ("p_RS_R_x [m]", Tx),
+            ("X (m)", Tx),
+            ("tx_m", Tx),
+            ("q_RS_w []", Qw),
+            ("pose.orientation.w", Qw),
+            ("/tf/transform/rotation/x", Qx),
+            ("%time", TimeS),
+            ("field.header.stamp", TimeS),
+            ("header.stamp", TimeS),
+            ("__time", TimeS),
+            ("#timestamp [ns]", TimeNs),
+            ("image_name", Frame),
+        ] {
+            assert!(Title::of(text).rank(column).is_some(), "{text}");
+        }
+        for (text, column) in [
+            ("p_RS_R_x [mm]", Tx),
+            ("time [ms]", TimeS),
+            ("v_RS_R_x [m s^-1]", Tx),
+            ("field.twist.linear.x", Tx),
+            ("field.header.frame_id", Frame),
+            ("b_w_RS_S_x [rad s^-1]", Qx),
+        ] {
+            assert!(Title::of(text).rank(column).is_none(), "{text}");
+        }
+    }
+}

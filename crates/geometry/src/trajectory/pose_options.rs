@@ -1,0 +1,20 @@
+//! Options for reading a pose file.
+
+use super::csv::ColumnMap;
+use super::entry_list::DuplicateTimes;
+use super::format::PoseFormat;
+use super::quaternion_order::QuaternionOrder;
+
+/// Options for reading a pose file. Those that do not concern its format have no effect.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PoseFileOptions {
+    /// The format; by default the one detected from the content.
+    pub format: Option<PoseFormat>,
+    /// CSV: names of columns in the file's header, for columns whose names are not known.
+    pub columns: ColumnMap,
+    /// TUM: the order of the quaternion's numbers; by default the one that a comment names, or
+    /// TUM's own.
+    pub quaternion: Option<QuaternionOrder>,
+    /// The handling of a time that two poses share.
+    pub duplicate_times: DuplicateTimes,
+}
