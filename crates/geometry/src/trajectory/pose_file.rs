@@ -5,7 +5,7 @@ use super::error::PoseError;
 use super::format::PoseFormat;
 use super::pose_entry::PoseEntry;
 use super::stamped_pose::{StampedPose, Trajectory};
-use super::{colmap, csv, euroc, kitti, nerfstudio, text, tum};
+use super::{colmap, colmap_binary, csv, euroc, kitti, nerfstudio, text, tum};
 use std::path::{Path, PathBuf};
 
 /// A file of poses, in its own convention, with at least one pose. Times, if present, increase;
@@ -42,21 +42,53 @@ impl PoseFile {
 }
 
 /// Reads a file of poses, in the given format or in the one detected from its content. A folder is
-/// a COLMAP model.
+/// a COLMAP model, and so is a file whose name ends in `.bin`.
 ///
 /// # Errors
 /// [`PoseError`]: an unreadable file, an unknown format, a line that is no pose, times that do not
 /// increase, two poses of one frame, no pose at all.
 pub fn read_poses(path: &Path, format: Option<PoseFormat>) -> Result<PoseFile, PoseError> {
     let path = if path.is_dir() {
-        path.join(colmap::IMAGES_FILE)
+        colmap_images(path)
     } else {
         path.to_owned()
     };
-    let text = text::read(&path)?;
+    let (format, entries) = match format {
+        None | Some(PoseFormat::Colmap) if colmap_binary::is_binary(&path) => {
+            (PoseFormat::Colmap, colmap_binary::read(&path)?)
+        }
+        format => read_text(&path, format)?,
+    };
+    if entries.is_empty() {
+        return Err(PoseError::file(&path, "holds no poses"));
+    }
+    Ok(PoseFile {
+        path,
+        format,
+        entries,
+    })
+}
+
+/// The pose file in the folder of a COLMAP model: that of the text model, unless there is only the
+/// binary one.
+fn colmap_images(folder: &Path) -> PathBuf {
+    let [text, binary] = [colmap::IMAGES_FILE, colmap_binary::IMAGES_FILE].map(|f| folder.join(f));
+    if binary.exists() && !text.exists() {
+        binary
+    } else {
+        text
+    }
+}
+
+/// Reads a text of poses in the given format or in the one detected.
+fn read_text(
+    path: &Path,
+    format: Option<PoseFormat>,
+) -> Result<(PoseFormat, Vec<PoseEntry>), PoseError> {
+    let text = text::read(path)?;
     let format = match format {
         Some(format) => format,
-        None => detect_format(&path, &text)?,
+        None => detect_format(path, &text)?,
     };
     let parse = match format {
         PoseFormat::Tum => tum::parse,
@@ -66,13 +98,5 @@ pub fn read_poses(path: &Path, format: Option<PoseFormat>) -> Result<PoseFile, P
         PoseFormat::Nerfstudio => nerfstudio::parse,
         PoseFormat::Euroc => euroc::parse,
     };
-    let entries = parse(&path, &text)?;
-    if entries.is_empty() {
-        return Err(PoseError::file(&path, "holds no poses"));
-    }
-    Ok(PoseFile {
-        path,
-        format,
-        entries,
-    })
+    Ok((format, parse(path, &text)?))
 }
