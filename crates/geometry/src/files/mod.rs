@@ -4,15 +4,18 @@
 //! | subject | file |
 //! | --- | --- |
 //! | opening and reading of regular files | [`regular`] |
+//! | numbers and names of binary files | [`binary`] |
 //! | largest sizes of text files | [`limits`] |
 //! | files that are locked or appended to, and targets that may be replaced | [`targets`] |
 //! | names and texts without control characters | [`printed()`] |
 
+pub mod binary;
 pub mod limits;
 pub mod printed;
 pub mod regular;
 pub mod targets;
 
+pub use binary::BinaryFile;
 pub use printed::{escape_controls, printed};
 pub use regular::{open_regular, read_regular, read_text};
 pub use targets::{check_replaceable_file, open_without_links, write_without_links};

@@ -13,7 +13,7 @@ pub enum PoseFormat {
     Kitti,
     /// A table with named columns.
     Csv,
-    /// COLMAP's text model: a folder with images.txt, or that file.
+    /// COLMAP's model: a folder with images.txt or images.bin, or that file.
     Colmap,
     /// nerfstudio's transforms.json.
     Nerfstudio,

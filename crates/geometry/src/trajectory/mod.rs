@@ -7,6 +7,7 @@
 //! | [`mod@csv`] | camera-to-world, OpenCV's axes | seconds or nanoseconds, if there | if there |
 //! | [`colmap`] | world-to-camera, OpenCV's axes | | yes |
 //! | [`nerfstudio`] | camera-to-world, OpenGL's axes | | yes |
+//! | `colmap_binary` (read only) | world-to-camera, OpenCV's axes | | yes |
 //! | `euroc` (read only) | body-to-world | nanoseconds | |
 //!
 //! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
@@ -27,6 +28,7 @@
 
 mod axes;
 pub mod colmap;
+mod colmap_binary;
 mod convention;
 pub mod csv;
 mod detection;

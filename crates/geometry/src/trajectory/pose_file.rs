@@ -6,7 +6,7 @@ use super::format::PoseFormat;
 use super::pose_entry::PoseEntry;
 use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
-use super::{colmap, csv, euroc, kitti, nerfstudio, text, tum};
+use super::{colmap, colmap_binary, csv, euroc, kitti, nerfstudio, text, tum};
 use std::path::{Path, PathBuf};
 
 /// A file of poses, in its own convention, with at least one pose. Times, if present, increase;
@@ -42,8 +42,8 @@ impl PoseFile {
     }
 }
 
-/// Reads a file of poses, in the given format or in the one detected from its content. A folder is
-/// a COLMAP model.
+/// Reads a file of poses, in the given format or in the one detected from its content, as
+/// [`read_poses_with`] does.
 ///
 /// # Errors
 /// [`PoseError`]: an unreadable file, an unknown format, a line that is no pose, times that do not
@@ -56,30 +56,23 @@ pub fn read_poses(path: &Path, format: Option<PoseFormat>) -> Result<PoseFile, P
     read_poses_with(path, &options)
 }
 
-/// Reads a file of poses with options. A folder is a COLMAP model.
+/// Reads a file of poses with options. A folder is a COLMAP model, and so is a file whose name ends
+/// in `.bin`.
 ///
 /// # Errors
 /// Those of [`read_poses`]; a column that `options` names and the file has not.
 pub fn read_poses_with(path: &Path, options: &PoseFileOptions) -> Result<PoseFile, PoseError> {
     let path = if path.is_dir() {
-        path.join(colmap::IMAGES_FILE)
+        colmap_images(path)
     } else {
         path.to_owned()
     };
-    let text = text::read(&path)?;
-    let format = match options.format {
-        Some(format) => format,
-        None => detect_format(&path, &text, options)?,
+    let (format, entries) = match options.format {
+        None | Some(PoseFormat::Colmap) if colmap_binary::is_binary(&path) => {
+            (PoseFormat::Colmap, colmap_binary::read(&path)?)
+        }
+        _ => read_text(&path, options)?,
     };
-    let duplicates = options.duplicate_times;
-    let entries = match format {
-        PoseFormat::Tum => tum::parse(&path, &text, options.quaternion, duplicates),
-        PoseFormat::Kitti => kitti::parse(&path, &text),
-        PoseFormat::Csv => csv::parse(&path, &text, &options.columns, duplicates),
-        PoseFormat::Colmap => colmap::parse(&path, &text),
-        PoseFormat::Nerfstudio => nerfstudio::parse(&path, &text),
-        PoseFormat::Euroc => euroc::parse(&path, &text, duplicates),
-    }?;
     if entries.is_empty() {
         return Err(PoseError::file(&path, "holds no poses"));
     }
@@ -88,4 +81,37 @@ pub fn read_poses_with(path: &Path, options: &PoseFileOptions) -> Result<PoseFil
         format,
         entries,
     })
+}
+
+/// The pose file in the folder of a COLMAP model: that of the text model, unless there is only the
+/// binary one.
+fn colmap_images(folder: &Path) -> PathBuf {
+    let [text, binary] = [colmap::IMAGES_FILE, colmap_binary::IMAGES_FILE].map(|f| folder.join(f));
+    if binary.exists() && !text.exists() {
+        binary
+    } else {
+        text
+    }
+}
+
+/// Reads a text of poses in the given format or in the one detected.
+fn read_text(
+    path: &Path,
+    options: &PoseFileOptions,
+) -> Result<(PoseFormat, Vec<PoseEntry>), PoseError> {
+    let text = text::read(path)?;
+    let format = match options.format {
+        Some(format) => format,
+        None => detect_format(path, &text, options)?,
+    };
+    let duplicates = options.duplicate_times;
+    let entries = match format {
+        PoseFormat::Tum => tum::parse(path, &text, options.quaternion, duplicates),
+        PoseFormat::Kitti => kitti::parse(path, &text),
+        PoseFormat::Csv => csv::parse(path, &text, &options.columns, duplicates),
+        PoseFormat::Colmap => colmap::parse(path, &text),
+        PoseFormat::Nerfstudio => nerfstudio::parse(path, &text),
+        PoseFormat::Euroc => euroc::parse(path, &text, duplicates),
+    }?;
+    Ok((format, entries))
 }

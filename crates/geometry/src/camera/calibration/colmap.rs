@@ -1,4 +1,4 @@
-//! COLMAP's `cameras.txt`.
+//! COLMAP's `cameras.txt`, and the cameras of its text and its binary model.
 
 use super::coefficients::{brown_conrady, eucm, fov, kannala_brandt, thin_prism_fisheye};
 use super::error::ParseError;
@@ -61,9 +61,15 @@ fn camera(line: &str) -> Result<Camera, String> {
             _ => Err(format!("{word:?} is not a number")),
         })
         .collect::<Result<_, String>>()?;
+    camera_of(model, [width, height], &params)
+}
+
+/// Creates a camera of COLMAP's model of that name; pixel coordinates are counted from the corner
+/// of the first pixel and converted.
+pub fn camera_of(model: &str, size: [u32; 2], params: &[f64]) -> Result<Camera, String> {
     let fail = |count: usize| format!("{model} has {count} parameters, not {}", params.len());
     // Focal lengths and principal point, and how many coefficients follow.
-    let (central, rest, lens): (_, _, ReadLens) = match *model {
+    let (central, rest, lens): (_, _, ReadLens) = match model {
         "SIMPLE_PINHOLE" => (3, 0, brown_conrady),
         "PINHOLE" => (4, 0, brown_conrady),
         "SIMPLE_RADIAL" => (3, 1, |d| brown_conrady(&[d[0], 0.0])),
@@ -94,7 +100,7 @@ fn camera(line: &str) -> Result<Camera, String> {
         _ => return Err(fail(central + rest)),
     };
     Ok(Camera::at_rest(
-        [width, height],
+        size,
         [fx, fy],
         [cx - 0.5, cy - 0.5],
         lens(&params[central..]).map_err(|error| error.what)?,

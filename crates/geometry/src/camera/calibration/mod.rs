@@ -1,6 +1,6 @@
 //! Calibration files: the program's own format (JSON or TOML), OpenCV's YAML, ROS's camera_info,
-//! Kalibr's camchain, the YAML of camodocal and VINS-Fusion, COLMAP's cameras.txt, nerfstudio's
-//! transforms.json, Basalt's JSON and OCamCalib's calib_results.txt.
+//! Kalibr's camchain, the YAML of camodocal and VINS-Fusion, COLMAP's cameras.txt and cameras.bin,
+//! nerfstudio's transforms.json, Basalt's JSON and OCamCalib's calib_results.txt.
 //!
 //! | file | recognised by | lens | centre of the first pixel |
 //! | --- | --- | --- | --- |
@@ -9,7 +9,7 @@
 //! | ROS | as OpenCV, with `distortion_model` | `plumb_bob`, `rational_polynomial`, `equidistant` | (0, 0) |
 //! | Kalibr | `.yaml` with `cam0:` | pinhole with `radtan`, `equidistant`, `fov`, `none`; `omni` with `radtan`, `none`; `ds`; `eucm` | (0, 0) |
 //! | camodocal | `.yaml` with `model_type` | `PINHOLE`, `MEI`, `KANNALA_BRANDT` | (0, 0) |
-//! | COLMAP | `.txt` | PINHOLE … FULL_OPENCV, the fisheyes, THIN_PRISM_FISHEYE, FOV, EUCM | (½, ½) |
+//! | COLMAP | `.txt`, `.bin` | PINHOLE … FULL_OPENCV, the fisheyes, THIN_PRISM_FISHEYE, FOV, EUCM | (½, ½) |
 //! | OCamCalib | `.txt` with five lines of numbers | polynomial | (0, 0) |
 //! | Basalt | `.json` with `value0` | `pinhole`, `ds`, `eucm`, `ucm`, `kb4`, `fov` | (0, 0) |
 //! | nerfstudio | `.json` with `fl_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
@@ -18,6 +18,9 @@ mod basalt;
 mod camodocal;
 mod coefficients;
 mod colmap;
+mod colmap_binary;
+#[cfg(test)]
+mod colmap_binary_tests;
 mod error;
 mod kalibr;
 mod lens_keys;

@@ -2,10 +2,13 @@
 
 use super::error::{CalibrationError, ParseError};
 use super::unknown::unknown_calibration;
-use super::{basalt, camodocal, colmap, kalibr, native, nerfstudio, ocamcalib, opencv, value_tree};
+use super::{
+    basalt, camodocal, colmap, colmap_binary, kalibr, native, nerfstudio, ocamcalib, opencv,
+    value_tree,
+};
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
-use crate::files::read_regular;
+use crate::files::{BinaryFile, read_regular};
 use std::path::Path;
 
 /// Smallest width and height of an image, pixels.
@@ -28,24 +31,26 @@ pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, Calib
         line: error.line,
         what: error.what,
     };
-    let bytes =
-        read_regular(path, MAX_CALIBRATION_BYTES).map_err(|source| CalibrationError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
+    let unreadable = |source| CalibrationError::Read {
+        path: path.to_owned(),
+        source,
+    };
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    let extension = extension.to_lowercase();
+    if extension == "bin" {
+        let mut file = BinaryFile::open(path).map_err(unreadable)?;
+        let camera = colmap_binary::read(&mut file, name);
+        return camera.and_then(validate).map_err(content);
+    }
+    let bytes = read_regular(path, MAX_CALIBRATION_BYTES).map_err(unreadable)?;
     let text = String::from_utf8(bytes).map_err(|_| {
         content(ParseError::new(
             "this is not a text file; give the calibration file itself",
         ))
     })?;
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    parse(
-        text.trim_start_matches('\u{feff}'),
-        &extension.to_lowercase(),
-        name,
-    )
-    .and_then(validate)
-    .map_err(content)
+    parse(text.trim_start_matches('\u{feff}'), &extension, name)
+        .and_then(validate)
+        .map_err(content)
 }
 
 fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, ParseError> {

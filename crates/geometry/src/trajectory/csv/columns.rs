@@ -5,7 +5,7 @@ use super::title::Title;
 use csv::StringRecord;
 
 /// The columns that this program writes.
-pub(in crate::trajectory) const FORM: &str = "frame,time_s,tx_m,ty_m,tz_m,qx,qy,qz,qw";
+pub(crate) const FORM: &str = "frame,time_s,tx_m,ty_m,tz_m,qx,qy,qz,qw";
 
 /// Indices of the columns.
 pub(super) struct Columns {

@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 use std::borrow::Cow;
 use std::path::Path;
 
-pub(in crate::trajectory) fn parse(
+pub(crate) fn parse(
     path: &Path,
     text: &str,
     map: &ColumnMap,

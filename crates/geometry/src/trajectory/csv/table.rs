@@ -2,8 +2,8 @@
 
 use csv::{ReaderBuilder, StringRecord};
 
-/// The records with content and the 1-based numbers of their first lines, without blank lines and comments; a
-/// record goes on in the next line while a quoted field is open.
+/// The records with content and the 1-based numbers of their first lines, without blank lines and
+/// comments; a record goes on in the next line while a quoted field is open.
 pub(super) fn records(text: &str, separator: u8) -> impl Iterator<Item = (usize, &str)> {
     let mut rest = text;
     let mut number = 0;
