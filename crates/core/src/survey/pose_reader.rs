@@ -3,6 +3,7 @@
 use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by_order, by_time};
 use super::error::SurveyError;
 use super::frame_times;
+use super::missing_poses::{self, MissingPoses, PoseGap};
 use super::poses_section::PosesSection;
 use crate::frames::FrameFile;
 use std::path::Path;
@@ -27,6 +28,8 @@ pub(super) struct InterpretedPoses {
     pub given: Trajectory,
     /// The convention.
     pub convention: Convention,
+    /// The frames that the file leaves out.
+    pub gaps: Vec<PoseGap>,
 }
 
 impl InterpretedPoses {
@@ -75,12 +78,17 @@ impl<'a> PoseReader<'a> {
         })
     }
 
-    /// Reads a file of poses and associates them with the frames.
+    /// Reads a file of poses and associates them with the frames; `missing`: what becomes of frames
+    /// that a file with names leaves out.
     ///
     /// # Errors
     /// A malformed file; poses of a body without its mount; frames and poses that cannot be
     /// associated; frames whose times do not increase.
-    pub fn read(&self, path: &Path) -> Result<InterpretedPoses, SurveyError> {
+    pub fn read(
+        &self,
+        path: &Path,
+        missing: MissingPoses,
+    ) -> Result<InterpretedPoses, SurveyError> {
         let file = read_poses(path, self.section.format)?;
         let mut convention = Convention::of(file.format);
         convention.direction = self.section.convention.unwrap_or(convention.direction);
@@ -103,9 +111,16 @@ impl<'a> PoseReader<'a> {
         } else {
             Associate::Order
         };
+        let mut gaps = Vec::new();
         let given = match self.section.associate.unwrap_or(default) {
             Associate::Order => by_order(&file, frames, times_s)?,
-            Associate::Name => by_name(&file, frames, times_s)?,
+            Associate::Name => {
+                let named = by_name(&file, frames, times_s)?;
+                let (given, left_out) =
+                    missing_poses::complete(&file.path, frames, times_s, &named, missing)?;
+                gaps = left_out;
+                given
+            }
             Associate::Time => {
                 let how = TimeAssociation {
                     tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
@@ -134,6 +149,10 @@ impl<'a> PoseReader<'a> {
                 });
             }
         }
-        Ok(InterpretedPoses { given, convention })
+        Ok(InterpretedPoses {
+            given,
+            convention,
+            gaps,
+        })
     }
 }

@@ -14,6 +14,7 @@ fn verdict(poses: &[Pose], given: Convention) -> Result<Vec<String>, String> {
     let reading = InterpretedPoses {
         given: indexed(poses.iter().copied()),
         convention: given,
+        gaps: Vec::new(),
     };
     let surface = Circle::new(RADIUS_M).unwrap();
     let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
