@@ -5,6 +5,7 @@ mod bad_input;
 mod broken_inputs;
 mod calibrate;
 mod check;
+mod colmap;
 mod compare;
 mod config;
 mod converge;

@@ -4,7 +4,7 @@ use crate::points::wall_points::WallPoints;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameSet;
-use tunnelstitch_core::survey::{CalibrateSection, DEFAULT_SHAPE_SIGMA_RADII, Survey};
+use tunnelstitch_core::survey::{CalibrateSection, DEFAULT_SHAPE_SIGMA_RADII, PoseGap, Survey};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::{Bend, RadialField, Surface, WallRegions, with_range};
 use tunnelstitch_geometry::trajectory::{Jitter, Shutter, StampedPose};
@@ -27,6 +27,8 @@ pub struct RefineInput<'a> {
     pub frames: &'a FrameSet,
     /// The initial poses, camera to world, one per frame.
     pub initial: &'a [StampedPose],
+    /// Frames whose initial poses are interpolated between their neighbours.
+    pub pose_gaps: &'a [PoseGap],
     /// Noise model of the initial poses.
     pub prior: Jitter,
     /// When the rows of each frame are read.
@@ -73,6 +75,7 @@ impl<'a> RefineInput<'a> {
             surface,
             frames,
             initial,
+            pose_gaps: &[],
             prior,
             shutter: Shutter::default(),
             ignored: &NOTHING,
@@ -94,6 +97,7 @@ impl<'a> From<&'a Survey> for RefineInput<'a> {
             radius_sigma: survey.radius_sigma,
             frames: &survey.frames,
             initial: &survey.initial,
+            pose_gaps: &survey.pose_gaps,
             prior: survey.prior,
             shutter: survey.shutter(),
             ignored: &survey.ignored,

@@ -199,6 +199,7 @@ impl Pictures {
         let input = RefineInput {
             frames: &frames,
             initial: &initial,
+            pose_gaps: &[],
             ..RefineInput::from(survey)
         };
         let setup = Setup::new(input, &options)?;

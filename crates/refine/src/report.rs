@@ -56,6 +56,9 @@ pub struct FrameReport {
     pub file: String,
     /// The basis of its pose.
     pub flag: FrameFlag,
+    /// True if the initial pose was not given, but interpolated between those of its neighbours.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub initial_interpolated: bool,
     /// The rejection reason, if the pose rests on the prior.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,

@@ -24,6 +24,7 @@ pub fn independent_prior(initial: &[Pose]) -> Prior {
         },
         times_s: (0..initial.len()).map(|k| k as f64).collect(),
         median_step_s: 1.0,
+        variance_ratios: vec![1.0; initial.len()],
         initial: initial.to_vec(),
         log_gain_sigma: 0.3,
         bias_sigma: 10.0,

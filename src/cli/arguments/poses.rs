@@ -72,7 +72,7 @@ enum FormatArgument {
     Kitti,
     /// Columns named in the first line.
     Csv,
-    /// COLMAP's text model: its folder, or images.txt.
+    /// COLMAP's model: its folder, images.txt or images.bin.
     Colmap,
     /// nerfstudio's transforms.json.
     Nerfstudio,
@@ -387,6 +387,7 @@ impl PosesArguments {
             if let Some(path) = self.file() {
                 file.poses = PosesSection {
                     as_built: Some(true),
+                    is_complete: true,
                     ..PosesSection::of(absolute(path))
                 };
             }

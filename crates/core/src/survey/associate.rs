@@ -65,15 +65,15 @@ pub(super) fn by_order(
 }
 
 /// Associates poses by name: the name in the file of poses must equal the frame's path or its end.
-/// Poses of other files are ignored.
+/// Poses of other files are ignored, and frames without a pose have none.
 ///
 /// # Errors
-/// A file without names; a frame without a pose, or with several.
+/// A file without names; a frame with several poses.
 pub(super) fn by_name(
     file: &PoseFile,
     frames: &[FrameFile],
     times_s: Option<&[f64]>,
-) -> Result<Trajectory, SurveyError> {
+) -> Result<Vec<Option<StampedPose>>, SurveyError> {
     let fail = |what: String| SurveyError::Association {
         path: file.path.clone(),
         what,
@@ -95,11 +95,7 @@ pub(super) fn by_name(
     let of_frame = |frame: &FrameFile| {
         let same = named.get(&frame.name()).map_or(&[][..], Vec::as_slice);
         let entry = match same {
-            [] => Err(fail(format!(
-                "no pose of frame {} ({})",
-                frame.index,
-                printed(&frame.path)
-            ))),
+            [] => return Ok(None),
             [(_, only)] => Ok(*only),
             // Several folders contain files of that name: compare the path's components.
             several => {
@@ -118,7 +114,7 @@ pub(super) fn by_name(
                 }
             }
         }?;
-        Ok(stamped(entry, frame.index, times_s))
+        Ok(Some(stamped(entry, frame.index, times_s)))
     };
     frames.iter().map(of_frame).collect()
 }
@@ -242,16 +238,19 @@ mod tests {
     fn names_find_their_poses_in_any_order() {
         let file = file(&["left/b.png", "./a.png", "right/b.png", "c.png"]);
         let found = by_name(&file, &frames(&["s/a.png", "s/right/b.png"]), None).unwrap();
-        assert_eq!([found[0].time_s, found[1].time_s], [11.0, 12.0]);
-        for (path, expected) in [
-            ("s/d.png", "no pose of frame 0"),
-            ("s/b.png", "2 poses could be"),
-        ] {
-            let message = by_name(&file, &frames(&[path]), None)
-                .unwrap_err()
-                .to_string();
-            assert!(message.contains(expected), "{message}");
-        }
+        let times_s = |found: &[Option<StampedPose>]| -> Vec<Option<f64>> {
+            found
+                .iter()
+                .map(|pose| Some(pose.as_ref()?.time_s))
+                .collect()
+        };
+        assert_eq!(times_s(&found), [Some(11.0), Some(12.0)]);
+        let found = by_name(&file, &frames(&["s/d.png", "s/c.png"]), None).unwrap();
+        assert_eq!(times_s(&found), [None, Some(13.0)]);
+        let message = by_name(&file, &frames(&["s/b.png"]), None)
+            .unwrap_err()
+            .to_string();
+        assert!(message.contains("2 poses could be"), "{message}");
     }
 
     #[test]

@@ -108,13 +108,13 @@ impl Discovery {
             if file.ends_with(SURVEY_FILE) {
                 continue;
             }
-            if matches!(lower.as_str(), "json" | "toml" | "yaml" | "yml" | "txt")
+            if is_calibration(file, &lower)
                 && bytes <= MAX_CALIBRATION_BYTES
                 && let Ok(camera) = read_calibration(&path, None)
             {
                 found.calibrations.push((file.clone(), camera));
             }
-            if matches!(lower.as_str(), "txt" | "tum" | "csv" | "json" | "kitti")
+            if is_pose_file(file, &lower)
                 && bytes <= MAX_POSES_BYTES
                 && let Ok(poses) = read_poses_with(&path, &options)
             {
@@ -193,6 +193,24 @@ impl Discovery {
     /// The ground truth, if a file is named so.
     pub fn truth(&self) -> Option<&(PathBuf, PoseFile)> {
         self.poses.iter().find(|(path, _)| is_truth(path))
+    }
+}
+
+/// True if a file may be a calibration, by its name; `extension` is in lower case.
+fn is_calibration(file: &Path, extension: &str) -> bool {
+    match extension {
+        "json" | "toml" | "yaml" | "yml" | "txt" => true,
+        "bin" => file.ends_with("cameras.bin"),
+        _ => false,
+    }
+}
+
+/// True if a file may hold poses, by its name; `extension` is in lower case.
+fn is_pose_file(file: &Path, extension: &str) -> bool {
+    match extension {
+        "txt" | "tum" | "csv" | "json" | "kitti" => true,
+        "bin" => file.ends_with("images.bin"),
+        _ => false,
     }
 }
 

@@ -39,8 +39,8 @@ impl Survey {
             );
         }
         let path = self.folder.join(&section.initial);
-        let (all, _) = self.read_as(section, &path, planned)?;
-        let kept = keyframe_indices(&poses_of(&all), step_deg.to_radians());
+        let all = self.read_as(section, &path, planned, section.missing_poses())?;
+        let kept = keyframe_indices(&poses_of(&all.trajectory), step_deg.to_radians());
         self.frames = self.frames.only(&kept);
         if let Some(times_s) = &mut self.times_s {
             *times_s = kept.iter().map(|k| times_s[*k]).collect();

@@ -86,6 +86,7 @@ mod frame_times;
 mod ignore;
 mod keyframe_selection;
 mod masked_wall;
+mod missing_poses;
 mod open;
 mod overlay;
 mod picture_motion;
@@ -109,6 +110,7 @@ pub use file::{CameraSection, FramesSection, OverlayUse, PriorSection, SURVEY_FI
 pub use frame_times::read_frame_times;
 pub use ignore::IgnoreSection;
 pub use masked_wall::{MASKED_FILE, MaskedTile, MaskedWall};
+pub use missing_poses::PoseGap;
 pub use open::Survey;
 pub use open::toml_path;
 pub use overlay::{Overlay, OverlayReport};

@@ -6,7 +6,8 @@ use super::file::read_survey_file;
 use super::file::{SURVEY_FILE, SurveyFile};
 use super::frame_list::{FrameList, orientation_warning};
 use super::masked_wall::MaskedWall;
-use super::pose_reader::{InterpretedPoses, PoseReader};
+use super::missing_poses::{self, MissingPoses, PoseGap};
+use super::pose_reader::PoseReader;
 use super::poses_section::PosesSection;
 use super::shape_file::ShapeFile;
 use super::{ignore, pose_validation};
@@ -50,6 +51,9 @@ pub struct Survey {
     pub frames: FrameSet,
     /// The initial poses, one per frame.
     pub initial: Trajectory,
+    /// The frames that the file of the initial poses leaves out, and whose initial poses are
+    /// interpolated.
+    pub pose_gaps: Vec<PoseGap>,
     /// The true poses, one per frame, if known.
     pub truth: Option<Trajectory>,
     /// Noise model of the initial poses.
@@ -60,6 +64,16 @@ pub struct Survey {
     pub(super) times_s: Option<Vec<f64>>,
     /// See [`Survey::own_files`].
     own_files: Vec<PathBuf>,
+}
+
+/// Poses of a file in the tunnel's frame, one per frame.
+pub(super) struct ReadPoses {
+    /// The poses.
+    pub trajectory: Trajectory,
+    /// The frames that the file leaves out.
+    pub gaps: Vec<PoseGap>,
+    /// Warnings about suspicious poses.
+    pub warnings: Vec<String>,
 }
 
 impl Survey {
@@ -152,6 +166,7 @@ impl Survey {
             ignored,
             frames: FrameSet::new(frames, mask),
             initial: Vec::new(),
+            pose_gaps: Vec::new(),
             truth: None,
             prior: file.prior.into(),
             warnings: Vec::new(),
@@ -164,24 +179,30 @@ impl Survey {
             survey.select_keyframes(step_deg, &toml_path, planned.as_ref())?;
         }
         let section = &survey.file.poses;
-        let (initial, mut warnings) = survey.read_as(
+        let read = survey.read_as(
             section,
             &survey.folder.join(&section.initial),
             match section.as_built {
                 Some(true) => survey.surface.as_ref(),
                 _ => planned.as_ref(),
             },
+            section.missing_poses(),
         )?;
         let initial = match section.as_built {
-            Some(true) => initial,
-            _ => survey.carried(initial),
+            Some(true) => read.trajectory,
+            _ => survey.carried(read.trajectory),
         };
+        let mut warnings = read.warnings;
         let truth = match &section.truth {
             Some(truth) => {
-                let (truth, more) =
-                    survey.read_as(section, &survey.folder.join(truth), survey.surface.as_ref())?;
-                warnings.extend(more);
-                Some(truth)
+                let read = survey.read_as(
+                    section,
+                    &survey.folder.join(truth),
+                    survey.surface.as_ref(),
+                    MissingPoses::Refuse,
+                )?;
+                warnings.extend(read.warnings);
+                Some(read.trajectory)
             }
             None => None,
         };
@@ -192,6 +213,7 @@ impl Survey {
                 .filter_map(|video| video.warning().map(str::to_owned)),
         );
         (survey.initial, survey.truth, survey.warnings) = (initial, truth, warnings);
+        survey.pose_gaps = read.gaps;
         survey.validate_readout().map_err(value)?;
         Ok(survey)
     }
@@ -204,7 +226,9 @@ impl Survey {
     /// tunnel.
     pub fn read_poses(&self, path: &Path) -> Result<Trajectory, SurveyError> {
         let surface = self.surface.as_ref();
-        Ok(self.read_as(&PosesSection::of(path), path, surface)?.0)
+        let section = PosesSection::of(path);
+        let read = self.read_as(&section, path, surface, MissingPoses::Refuse)?;
+        Ok(read.trajectory)
     }
 
     /// Initial poses carried along with the bend of the tunnel: they are those of the tunnel as
@@ -220,22 +244,27 @@ impl Survey {
         initial.into_iter().map(carry).collect()
     }
 
-    /// Reads a file of poses in the tunnel `surface` with the options of a section; also returns
-    /// warnings.
+    /// Reads a file of poses in the tunnel `surface` with the options of a section.
     pub(super) fn read_as(
         &self,
         section: &PosesSection,
         path: &Path,
         surface: &dyn Surface,
-    ) -> Result<(Trajectory, Vec<String>), SurveyError> {
+        missing: MissingPoses,
+    ) -> Result<ReadPoses, SurveyError> {
         let times_s = self.times_s.as_deref();
-        let reading: InterpretedPoses =
-            PoseReader::new(section, &self.folder, &self.frames, times_s)?.read(path)?;
+        let reader = PoseReader::new(section, &self.folder, &self.frames, times_s)?;
+        let reading = reader.read(path, missing)?;
         let trajectory = reading.trajectory();
         let poses = poses_of(&trajectory);
-        let warning =
+        let mut warnings =
             pose_validation::validate_poses(surface, &self.camera, &reading, &poses, path)?;
-        Ok((trajectory, warning))
+        warnings.extend(missing_poses::warning(path, &self.frames, &reading.gaps));
+        Ok(ReadPoses {
+            trajectory,
+            gaps: reading.gaps,
+            warnings,
+        })
     }
 
     /// The files of the survey except the frames, even if others were read in their place.

@@ -3,6 +3,7 @@
 use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by_order, by_time};
 use super::error::SurveyError;
 use super::frame_times;
+use super::missing_poses::{self, MissingPoses, PoseGap};
 use super::poses_section::PosesSection;
 use crate::frames::FrameFile;
 use std::path::Path;
@@ -29,6 +30,8 @@ pub(super) struct InterpretedPoses {
     pub convention: Convention,
     /// The file's format.
     pub format: PoseFormat,
+    /// The frames that the file leaves out.
+    pub gaps: Vec<PoseGap>,
 }
 
 impl InterpretedPoses {
@@ -77,12 +80,17 @@ impl<'a> PoseReader<'a> {
         })
     }
 
-    /// Reads a file of poses and associates them with the frames.
+    /// Reads a file of poses and associates them with the frames; `missing`: what becomes of frames
+    /// that a file with names leaves out.
     ///
     /// # Errors
     /// A malformed file; poses of a body without its mount; frames and poses that cannot be
     /// associated; frames whose times do not increase.
-    pub fn read(&self, path: &Path) -> Result<InterpretedPoses, SurveyError> {
+    pub fn read(
+        &self,
+        path: &Path,
+        missing: MissingPoses,
+    ) -> Result<InterpretedPoses, SurveyError> {
         let file = read_poses_with(path, &self.section.file_options())?;
         let mut convention = Convention::of(file.format);
         convention.direction = self.section.convention.unwrap_or(convention.direction);
@@ -105,9 +113,16 @@ impl<'a> PoseReader<'a> {
         } else {
             Associate::Order
         };
+        let mut gaps = Vec::new();
         let given = match self.section.associate.unwrap_or(default) {
             Associate::Order => by_order(&file, frames, times_s)?,
-            Associate::Name => by_name(&file, frames, times_s)?,
+            Associate::Name => {
+                let named = by_name(&file, frames, times_s)?;
+                let (given, left_out) =
+                    missing_poses::complete(&file.path, frames, times_s, &named, missing)?;
+                gaps = left_out;
+                given
+            }
             Associate::Time => {
                 let how = TimeAssociation {
                     tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
@@ -140,6 +155,7 @@ impl<'a> PoseReader<'a> {
             given,
             convention,
             format: file.format,
+            gaps,
         };
         let read = match self.section.unit_m {
             Some(unit_m) => read.in_unit(unit_m),

@@ -62,7 +62,7 @@ impl Survey {
         let section = &self.file.poses;
         let times_s = self.times_s.as_deref();
         let given = PoseReader::new(section, &self.folder, &self.frames, times_s)?
-            .read(&self.folder.join(&section.initial))?;
+            .read(&self.folder.join(&section.initial), section.missing_poses())?;
         let surface = self.surface.as_ref();
         let mut readings = vec![PoseReading {
             changes: 0,
@@ -132,6 +132,7 @@ impl InterpretedPoses {
             given: given.collect(),
             convention: self.convention,
             format: self.format,
+            gaps: self.gaps.clone(),
         }
     }
 
@@ -155,6 +156,7 @@ impl InterpretedPoses {
             given: given.collect(),
             convention: self.convention,
             format: self.format,
+            gaps: self.gaps.clone(),
         }
     }
 }

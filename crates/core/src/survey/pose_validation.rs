@@ -386,6 +386,9 @@ pub(super) fn validate_poses(
                      {other}",
                     stand.outside, stand.frames
                 ),
+                None if is_interpolated(reading, frame) => "the file has no pose of it, and its \
+                     neighbours lead there; give it a pose, or leave it out of frames.images"
+                    .to_owned(),
                 None => "check radius_m and the poses' origin, units and convention \
                          (--pose-convention, --tunnel-frame)"
                     .to_owned(),
@@ -416,6 +419,12 @@ pub(super) fn validate_poses(
         )]);
     }
     Ok(Vec::new())
+}
+
+/// True if the file has no pose of a frame.
+fn is_interpolated(reading: &InterpretedPoses, frame: usize) -> bool {
+    let mut gaps = reading.gaps.iter();
+    gaps.any(|gap| gap.frames.contains(&frame))
 }
 
 /// Refuses cameras far from all others along the tunnel.

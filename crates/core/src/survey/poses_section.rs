@@ -1,6 +1,7 @@
 //! `[poses]`: the pose files and their convention.
 
 use super::associate::Associate;
+use super::missing_poses::MissingPoses;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use tunnelstitch_geometry::trajectory::{
@@ -60,9 +61,22 @@ pub struct PosesSection {
     /// they are those in the tunnel as planned, along whose bend (`shape_file`) they are carried.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub as_built: Option<bool>,
+    /// True if the initial poses are a result, in which every frame must have one; else frames that
+    /// a file with names leaves out start between their neighbours. No key of `survey.toml`.
+    #[serde(skip)]
+    pub is_complete: bool,
 }
 
 impl PosesSection {
+    /// Treatment of frames that the file of the initial poses leaves out.
+    pub(super) fn missing_poses(&self) -> MissingPoses {
+        if self.is_complete {
+            MissingPoses::Refuse
+        } else {
+            MissingPoses::Interpolate
+        }
+    }
+
     /// A section with only the path of the initial poses.
     pub fn of(initial: impl Into<PathBuf>) -> Self {
         Self {

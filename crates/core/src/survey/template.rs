@@ -41,8 +41,8 @@ impl Discovery {
             Some((path, _)) => writeln!(text, "file = {}", quoted(path)),
             None => writeln!(
                 text,
-                "# No calibration was found: OpenCV, ROS or Kalibr YAML, COLMAP's cameras.txt, \
-                 nerfstudio's transforms.json, or our camera.json.\n\
+                "# No calibration was found: OpenCV, ROS or Kalibr YAML, COLMAP's cameras.txt or \
+                 cameras.bin, nerfstudio's transforms.json, or our camera.json.\n\
                  file = \"camera.json\""
             ),
         };

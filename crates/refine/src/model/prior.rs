@@ -9,6 +9,7 @@ use crate::parameters::calibration::{DATUM_PARAMETERS, Datum, INTRINSIC_PARAMETE
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use nalgebra::{Matrix6, Vector3, Vector6};
 use std::ops::Range;
+use tunnelstitch_core::survey::PoseGap;
 use tunnelstitch_geometry::numerics::median::upper_median;
 use tunnelstitch_geometry::surface::{Gauge, GaugeMotion};
 use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose};
@@ -27,7 +28,7 @@ use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose};
 ///
 /// `R̂, t̂` are the initial poses transformed to the tunnel, and t is multiplied by the scale, both
 /// by the [`Datum`]. Σ is the diagonal variance of the jitter, for a step of a random walk times
-/// its [`Prior::step_ratio`].
+/// its [`Prior::step_ratio`], for a pose times its [`Prior::variance_ratios`].
 #[derive(Clone, Debug)]
 pub struct Prior {
     /// Noise model of the initial poses.
@@ -38,6 +39,9 @@ pub struct Prior {
     pub times_s: Vec<f64>,
     /// Median step between these times, seconds.
     pub median_step_s: f64,
+    /// Factors of the variance of each initial pose: 1 if it was given, more if it was interpolated
+    /// ([`variance_ratios`]).
+    pub variance_ratios: Vec<f64>,
     /// 1-σ of the log-gain.
     pub log_gain_sigma: f64,
     /// 1-σ of the bias, grey levels.
@@ -50,6 +54,22 @@ pub fn median_step_s(times_s: &[f64]) -> f64 {
     upper_median(steps.collect()).unwrap_or(1.0)
 }
 
+/// Factors of the variance of the initial poses of `count` frames: 1, but the steps of the gap for
+/// frames whose poses were interpolated.
+pub fn variance_ratios(count: usize, gaps: &[PoseGap]) -> Vec<f64> {
+    let mut ratios = vec![1.0; count];
+    for gap in gaps {
+        for ratio in ratios
+            .iter_mut()
+            .take(gap.frames.end)
+            .skip(gap.frames.start)
+        {
+            *ratio = gap.steps() as f64;
+        }
+    }
+    ratios
+}
+
 /// Applies the step from `from` to `to` to a pose.
 pub fn predict(pose: &Pose, from: &Pose, to: &Pose) -> Pose {
     Pose::new(
@@ -60,14 +80,17 @@ pub fn predict(pose: &Pose, from: &Pose, to: &Pose) -> Pose {
 
 impl Prior {
     /// Number of median steps between two frames, by their times: the factor by which the variance
-    /// of a random walk grows. Each step counts at least once.
+    /// of a random walk grows. Each step counts at least once, and one of an interpolated pose as
+    /// often as the gap has steps.
     pub fn steps_between(&self, a: usize, b: usize) -> f64 {
         (a..b).map(|k| self.step_ratio(k)).sum()
     }
 
-    /// Step from frame `k` to the next over the median step, at least 1.
+    /// Step from frame `k` to the next over the median step, at least 1, times the larger of the
+    /// variance ratios of both.
     fn step_ratio(&self, k: usize) -> f64 {
-        ((self.times_s[k + 1] - self.times_s[k]) / self.median_step_s).max(1.0)
+        let time_ratio = ((self.times_s[k + 1] - self.times_s[k]) / self.median_step_s).max(1.0);
+        time_ratio * self.variance_ratios[k].max(self.variance_ratios[k + 1])
     }
 
     /// Lever arm of an error of scale or tilt, metres: the longest step of a random walk, or the
@@ -204,7 +227,7 @@ impl Prior {
         let datum = sums.datum;
         let initial = datum.to_tunnel(&self.initial[k]);
         let (e, j) = absolute_error(&initial, pose, datum.scale);
-        let weighted = Matrix6::from_diagonal(&self.information());
+        let weighted = Matrix6::from_diagonal(&(self.information() / self.variance_ratios[k]));
         let slot = k - sums.active.start;
         add_gradient(sums.normal, slot, &(j.transpose() * weighted * e));
         let block = embed(&(j.transpose() * weighted * j));
@@ -317,6 +340,7 @@ mod tests {
                 initial: (0..5).map(|k| pose(0.1 * f64::from(k))).collect(),
                 times_s: vec![0.0, 1.0, 2.0, 5.0, 6.0],
                 median_step_s: 1.0,
+                variance_ratios: vec![1.0, 3.0, 3.0, 1.0, 1.0],
                 log_gain_sigma: 0.3,
                 bias_sigma: 10.0,
             };
@@ -370,5 +394,20 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A step into, within and out of a gap counts as often as the gap has steps.
+    #[test]
+    fn steps_of_a_gap_are_less_certain() {
+        let gaps = [PoseGap { frames: 2..4 }];
+        let ratios = variance_ratios(6, &gaps);
+        assert_eq!(ratios, [1.0, 1.0, 3.0, 3.0, 1.0, 1.0]);
+        let prior = Prior {
+            variance_ratios: ratios,
+            ..crate::test_scene::independent_prior(&[pose(0.0); 6])
+        };
+        let steps: Vec<f64> = (0..5).map(|k| prior.steps_between(k, k + 1)).collect();
+        assert_eq!(steps, [1.0, 3.0, 3.0, 3.0, 1.0]);
+        assert_eq!(prior.steps_between(0, 5), 11.0);
     }
 }

@@ -166,6 +166,7 @@ impl Placement {
         FrameReport {
             index: k,
             file: setup.input.frames[k].name(),
+            initial_interpolated: setup.prior.variance_ratios[k] > 1.0,
             flag: match rejection {
                 None => FrameFlag::Photometric,
                 Some(RejectionReason::Ambiguous { .. }) => FrameFlag::Ambiguous,

@@ -5,7 +5,7 @@ use crate::error::RefineError;
 use crate::input::{RefineInput, is_motionless};
 use crate::model::context::{EstimationContext, total_displacement};
 use crate::model::frame_states::FrameStates;
-use crate::model::prior::{Prior, median_step_s};
+use crate::model::prior::{Prior, median_step_s, variance_ratios};
 use crate::options::{RefineOptions, ShapeMode};
 use crate::parameters::calibration::{
     BEND_INDEX, BEND_PARAMETERS, Calibration, DATUM_PARAMETERS, INTRINSIC_PARAMETERS, Kappa,
@@ -78,6 +78,7 @@ impl<'a> Setup<'a> {
             jitter: input.prior,
             initial: poses_of(input.initial),
             median_step_s: median_step_s(&times_s),
+            variance_ratios: variance_ratios(poses, input.pose_gaps),
             times_s,
             log_gain_sigma: options.log_gain_sigma,
             bias_sigma: options.bias_sigma,

@@ -61,7 +61,7 @@ fn predict_pose_unchecked(
             }
             None => PosePrediction {
                 pose: initial(frame),
-                sigma_scale: 1.0,
+                sigma_scale: context.prior.variance_ratios[frame].sqrt(),
             },
         },
         JitterModel::Independent => {
@@ -71,7 +71,7 @@ fn predict_pose_unchecked(
             let motion = context.gauge().align(&from, &to);
             PosePrediction {
                 pose: motion.apply(&initial(frame)),
-                sigma_scale: 1.0,
+                sigma_scale: context.prior.variance_ratios[frame].sqrt(),
             }
         }
     }

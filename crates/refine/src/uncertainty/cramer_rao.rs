@@ -37,7 +37,7 @@ use crate::error::RefineError;
 use crate::linear::normal_equations::{Block, NormalEquations};
 use crate::linear::selected_inverse::SelectedInverse;
 use crate::model::context::{EstimationContext, FrameWindow};
-use crate::model::prior::{Prior, median_step_s};
+use crate::model::prior::{Prior, median_step_s, variance_ratios};
 use crate::options::RefineOptions;
 use crate::parameters::calibration::{Calibration, Kappa};
 use crate::parameters::frame_estimate::FrameEstimate;
@@ -99,6 +99,7 @@ pub fn pose_bounds(
         jitter: survey.prior,
         initial: survey.initial_poses(),
         median_step_s: median_step_s(&times_s),
+        variance_ratios: variance_ratios(survey.initial.len(), &survey.pose_gaps),
         times_s,
         log_gain_sigma: options.log_gain_sigma,
         bias_sigma: options.bias_sigma,

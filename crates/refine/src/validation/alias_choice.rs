@@ -182,9 +182,11 @@ impl Evidence<'_> {
             };
             for (i, initial) in initial.iter().enumerate() {
                 let expected = gauge_motion.apply(initial);
+                let variance_ratio = self.prior.variance_ratios[self.frames[i]];
                 let cost = |own: &GaugeMotion| {
                     self.prior
                         .deviation_cost(&expected, &own.apply(&self.poses[i]))
+                        / variance_ratio
                 };
                 let (best, second) =
                     choose_likeliest(&self.alias_motions[i], self.periods, min_odds, cost);
@@ -225,6 +227,7 @@ mod tests {
             initial: spiral(12, 0.1, 30f64.to_radians()),
             times_s: (0..12).map(f64::from).collect(),
             median_step_s: 1.0,
+            variance_ratios: vec![1.0; 12],
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
         }

@@ -149,6 +149,7 @@ mod tests {
             initial: spiral(9, 0.1, 30f64.to_radians()),
             times_s: (0..9).map(f64::from).collect(),
             median_step_s: 1.0,
+            variance_ratios: vec![1.0; 9],
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
         }

@@ -230,6 +230,7 @@ fn errors(
             let of_frame = |&k: &usize| {
                 let (e, _) = absolute_error(&initial[k], &poses[k], datum.scale);
                 let variance = covariances.frames[k].diagonal();
+                let sigma = sigma * prior.variance_ratios[k].sqrt();
                 PriorError::new(&e, &variance, &(initial[k].t_wc - middle), &sigma)
             };
             chosen.iter().map(of_frame).collect()
@@ -339,6 +340,7 @@ mod tests {
             initial: spiral(COUNT, 0.1, 30f64.to_radians()),
             times_s: (0..COUNT).map(|k| k as f64).collect(),
             median_step_s: 1.0,
+            variance_ratios: vec![1.0; COUNT],
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
         }

@@ -3,7 +3,16 @@
 use super::super::file;
 use tunnelstitch::survey::Discovery;
 
-const NAMES: [&str; 6] = ["a.json", "a.toml", "a.yaml", "a.txt", "a.csv", "a.png"];
+const NAMES: [&str; 8] = [
+    "a.json",
+    "a.toml",
+    "a.yaml",
+    "a.txt",
+    "a.csv",
+    "a.png",
+    "cameras.bin",
+    "images.bin",
+];
 
 /// Reads the input.
 pub fn run(data: &[u8]) {

@@ -1,5 +1,5 @@
-//! Files of poses; the first byte selects the format, detected or given, and the association with
-//! frames.
+//! Files of poses; the first byte selects text or COLMAP's binary model, the format, detected or
+//! given, and the association with frames.
 
 use super::super::{file, small_survey};
 use std::path::PathBuf;
@@ -27,9 +27,15 @@ pub fn run(data: &[u8]) {
     let Some((first, content)) = data.split_first() else {
         return;
     };
-    let choice = usize::from(*first);
+    let choice = usize::from(first & 0x7f);
     let format = FORMATS[choice % FORMATS.len()];
-    let (_folder, path) = file("poses.txt", content);
+    // The highest bit is of no consequence for the rest.
+    let name = if first & 0x80 == 0 {
+        "poses.txt"
+    } else {
+        "images.bin"
+    };
+    let (_folder, path) = file(name, content);
     let Ok(read) = read_poses(&path, format) else {
         return;
     };

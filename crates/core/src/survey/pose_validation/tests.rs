@@ -15,6 +15,7 @@ fn verdict(poses: &[Pose], given: Convention) -> Result<Vec<String>, String> {
         given: indexed(poses.iter().copied()),
         convention: given,
         format: PoseFormat::Tum,
+        gaps: Vec::new(),
     };
     let surface = Circle::new(RADIUS_M).unwrap();
     let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
