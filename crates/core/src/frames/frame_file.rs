@@ -4,7 +4,6 @@ use super::error::FrameError;
 use super::picture_reading::PictureReading;
 use super::video::Video;
 use alphanumeric_sort::compare_path;
-use glob::MatchOptions;
 use image::DynamicImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -141,6 +140,12 @@ fn find_unreadable_name(folder: &Path, pattern: &str) -> Option<PathBuf> {
     None
 }
 
+/// True for a file whose name begins with a dot, such as those that macOS leaves beside others.
+fn is_hidden(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default();
+    name.as_encoded_bytes().starts_with(b".")
+}
+
 /// Lists the files that match `pattern` (glob syntax, relative to `folder`, a backslash taken for a
 /// slash), in the natural order of their names (`frame2` before `frame10`), without the mask and
 /// without hidden ones, whose names begin with a dot.
@@ -166,16 +171,11 @@ pub fn list_frames(
     let escaped = glob::Pattern::escape(name);
     let pattern = &pattern.replace('\\', "/");
     let full = Path::new(&escaped).join(pattern);
-    let without_hidden = MatchOptions {
-        require_literal_leading_dot: true,
-        ..MatchOptions::default()
-    };
-    let found = glob::glob_with(&full.to_string_lossy(), without_hidden)
-        .map_err(|error| fail(error.to_string()))?;
+    let found = glob::glob(&full.to_string_lossy()).map_err(|error| fail(error.to_string()))?;
     let mut paths = Vec::new();
     for path in found {
         let path = path.map_err(|error| fail(error.to_string()))?;
-        if !path.is_dir() && Some(path.as_path()) != mask {
+        if !path.is_dir() && Some(path.as_path()) != mask && !is_hidden(&path) {
             paths.push(path);
         }
     }
