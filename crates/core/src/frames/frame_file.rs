@@ -185,7 +185,7 @@ pub fn list_frames(
             printed(&path)
         )));
     }
-    // Names that count as equal, such as 1 and 01, are ordered by their letters.
+    // Different names never count as equal.
     paths.sort_by(|a, b| compare_path(a, b).then_with(|| a.cmp(b)));
     if paths.is_empty() {
         return Err(FrameError::NoFrames {
@@ -217,7 +217,7 @@ mod tests {
         for pattern in ["frames/*.png", r"frames\*.png"] {
             let frames = list_frames(dir.path(), pattern, Some(&mask)).unwrap();
             let names: Vec<String> = frames.iter().map(FrameFile::name).collect();
-            assert_eq!(names, ["f1.png", "f02.png", "f2.png", "f10.png"]);
+            assert_eq!(names, ["f1.png", "f2.png", "f02.png", "f10.png"]);
             assert!(frames.iter().enumerate().all(|(k, frame)| frame.index == k));
         }
     }
