@@ -88,9 +88,9 @@ fn unused_bits(check: &Check) -> Option<String> {
     let bits = check.pictures.used_bits?;
     (9..=MAX_USED_BITS).contains(&bits).then(|| {
         format!(
-            "the frames have files of 16 bits, but no value of more than {bits} (mean grey level \
-             {:.0} of 255): if the camera delivers {bits} bits, add bits = {bits} under [frames]; \
-             otherwise use more light or a longer exposure",
+            "the frames have files of 16 bits, but no value of more than {bits} bits (mean grey \
+             level {:.0} of 255): if the camera delivers {bits} bits, add bits = {bits} under \
+             [frames]; otherwise use more light or a longer exposure",
             check.pictures.grey
         )
     })

@@ -4,7 +4,7 @@
 #![cfg(target_os = "linux")]
 
 use crate::support::outputs::{Outputs, files, outputs};
-use crate::support::server::{JSON, Running, mark, small_site};
+use crate::support::server::{JSON, Running, export_site, mark};
 use crate::support::{first_frames, missing, npm, succeed, text};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -302,7 +302,7 @@ fn change(server: &Running) -> BTreeMap<&'static str, Vec<Option<String>>> {
 /// kind in every thread; their number.
 fn view(most: usize) -> [usize; 2] {
     let dir = tempfile::tempdir().unwrap();
-    let site = small_site(dir.path());
+    let site = export_site(dir.path(), "10");
     let trace = dir.path().join("trace");
     let mut done = [0; 2];
     for (call, error) in CALLS {

@@ -1,6 +1,6 @@
 //! The viewer: its server from outside, and its page in a browser.
 
-use crate::support::server::{JSON, Running, mark, small_site};
+use crate::support::server::{JSON, Running, export_site, mark};
 use crate::support::{blender_survey, chromium, fail, json, npm, succeed, text};
 use serde_json::Value;
 use std::io::Write;
@@ -32,21 +32,8 @@ fn the_server_answers_its_own_page_and_writes_nothing_but_marks() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let site = dir.path().join("site");
     std::fs::write(dir.path().join("secret.json"), "secret").unwrap();
-    let survey = blender_survey();
-    succeed(&[
-        "export",
-        text(&survey),
-        "--poses",
-        "truth",
-        "--layers",
-        "truth",
-        "--px-per-metre",
-        "20",
-        "--web",
-        text(&site),
-    ]);
+    let site = export_site(dir.path(), "20");
     let before = names(&site);
     let server = Running::start(&[text(&site)]);
     let port = server.port;
@@ -169,7 +156,7 @@ fn without_the_token_nothing_is_told() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let server = Running::start(&[text(&small_site(dir.path()))]);
+    let server = Running::start(&[text(&export_site(dir.path(), "10"))]);
     let host = format!("Host: 127.0.0.1:{}\r\n", server.port);
     let wrong = "0".repeat(32);
     for path in [
@@ -191,7 +178,7 @@ fn others_do_not_wait_for_idle_connections() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let server = Running::start(&[text(&small_site(dir.path()))]);
+    let server = Running::start(&[text(&export_site(dir.path(), "10"))]);
     let connect = || TcpStream::connect(("127.0.0.1", server.port)).expect("a connection");
     let begun = Instant::now();
     let idle: Vec<TcpStream> = (0..200).map(|_| connect()).collect();
@@ -232,7 +219,7 @@ fn marks_of_two_servers_are_all_kept() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let site = small_site(dir.path());
+    let site = export_site(dir.path(), "10");
     let servers = [(); 2].map(|()| Running::start(&[text(&site)]));
     let put = |server: usize, id: &str, mark: &str| {
         servers[server].ask(&format!("PUT /api/marks/{id}"), JSON, mark)

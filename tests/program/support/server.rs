@@ -105,8 +105,8 @@ pub fn mark(id: &str) -> String {
     )
 }
 
-/// A folder of the page that `export --web` has written.
-pub fn small_site(folder: &Path) -> PathBuf {
+/// A folder of the page that `export --web` has written, with so many pixels per metre of wall.
+pub fn export_site(folder: &Path, px_per_metre: &str) -> PathBuf {
     let site = folder.join("site");
     let survey = blender_survey();
     let export = [
@@ -117,7 +117,13 @@ pub fn small_site(folder: &Path) -> PathBuf {
         "--layers",
         "truth",
     ];
-    let options = ["--px-per-metre", "10", "--web", text(&site), "--quiet"];
+    let options = [
+        "--px-per-metre",
+        px_per_metre,
+        "--web",
+        text(&site),
+        "--quiet",
+    ];
     succeed(&[&export[..], &options].concat());
     site
 }

@@ -103,13 +103,12 @@ fn scale_values<P: Pixel<Subpixel = u16>>(
     white: u16,
 ) -> u16 {
     let mut brightest = 0;
-    let scaled = |value: u16| {
+    let mut scaled = |value: u16| {
         brightest = brightest.max(value);
         let (value, white) = (u32::from(value.min(white)), u32::from(white));
         // Rounded; it is no more than 65535.
         ((value * u32::from(u16::MAX) + white / 2) / white) as u16
     };
-    let mut scaled = scaled;
     for pixel in picture.pixels_mut() {
         pixel.apply_with_alpha(&mut scaled, |alpha| alpha);
     }

@@ -3,7 +3,7 @@
 use super::error::SurveyError;
 use super::file::FramesSection;
 use super::frame_times;
-use crate::frames::{self, FrameFile, FrameSet, PictureOrientation, PictureReading, Video};
+use crate::frames::{self, FrameFile, PictureOrientation, PictureReading, Video};
 use std::path::Path;
 use std::sync::Arc;
 use tunnelstitch_geometry::files::printed;
@@ -107,25 +107,31 @@ impl FrameList {
         Ok(listing)
     }
 
-    /// The frames with pictures read as turned for display, if these alone have the size of the
-    /// calibration.
-    pub fn turned_to(mut self, size: (u32, u32), section: &FramesSection) -> Self {
-        let Some(first) = self.frames.first() else {
-            return self;
+    /// The frames with pictures read as turned for display, if only these have the `size` of the
+    /// calibration; also the warning that they are, or that they are not although their EXIF data
+    /// name an orientation. A section that says which is followed without a word.
+    pub fn oriented(mut self, size: (u32, u32), section: &FramesSection) -> (Self, Option<String>) {
+        let first = self
+            .frames
+            .first()
+            .filter(|_| section.orientation.is_none());
+        // A file that cannot be read is an error of its own.
+        let named = first.and_then(|first| Some((first, first.exif_orientation().ok()??)));
+        let Some((first, number)) = named else {
+            return (self, None);
         };
+        let file = printed(first.file()).to_string();
         let turned = PictureReading {
             orientation: PictureOrientation::Exif,
             ..picture_reading(section).unwrap_or_default()
         };
         let fits = |frame: &FrameFile| frame.size().is_ok_and(|found| found == size);
-        let is_turned = section.orientation.is_none()
-            && !fits(first)
-            && fits(&first.clone().with_reading(turned));
+        let is_turned = !fits(first) && fits(&first.clone().with_reading(turned));
         if is_turned {
             let frames = self.frames.into_iter();
             self.frames = frames.map(|frame| frame.with_reading(turned)).collect();
         }
-        self
+        (self, Some(orientation_warning(&file, number, is_turned)))
     }
 
     fn of_video(video: Arc<Video>, every: usize) -> Self {
@@ -139,19 +145,12 @@ impl FrameList {
     }
 }
 
-/// The warning that pictures whose EXIF data name an orientation are turned, or that they are not,
-/// unless the section says which.
-pub(super) fn orientation_warning(section: &FramesSection, frames: &FrameSet) -> Option<String> {
-    let first = frames.iter().next()?;
-    let reading = first.reading().filter(|_| section.orientation.is_none())?;
-    // A file that cannot be read is an error of its own.
-    let number = first.exif_orientation().ok().flatten()?;
+/// The warning that pictures whose EXIF data name an orientation are turned, or that they are not.
+fn orientation_warning(file: &str, number: u8, is_turned: bool) -> String {
     let named = format!(
-        "{}: by its EXIF orientation ({number}) it is to be turned or mirrored for display",
-        printed(first.file())
+        "{file}: by its EXIF orientation ({number}) it is to be turned or mirrored for display"
     );
-    let is_turned = reading.orientation == PictureOrientation::Exif;
-    Some(if is_turned {
+    if is_turned {
         format!(
             "{named}, which is done, since the calibration fits only that; the poses must be \
              those of the camera turned likewise; orientation = \"exif\" under [frames] confirms \
@@ -163,5 +162,5 @@ pub(super) fn orientation_warning(section: &FramesSection, frames: &FrameSet) ->
              stored; if the camera was calibrated with turned pictures, add orientation = \
              \"exif\" under [frames], otherwise orientation = \"stored\""
         )
-    })
+    }
 }

@@ -4,14 +4,14 @@ use super::associate::TIME_TOLERANCE_S;
 use super::error::SurveyError;
 use super::file::read_survey_file;
 use super::file::{SURVEY_FILE, SurveyFile};
-use super::frame_list::{FrameList, orientation_warning};
+use super::frame_list::FrameList;
 use super::masked_wall::MaskedWall;
 use super::missing_poses::{self, MissingPoses, PoseGap};
 use super::pose_reader::PoseReader;
 use super::poses_section::PosesSection;
 use super::shape_file::ShapeFile;
 use super::{ignore, pose_validation};
-use crate::frames::{FrameSet, Mask};
+use crate::frames::{FrameSet, Mask, Video};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
@@ -131,24 +131,16 @@ impl Survey {
             },
             surface.as_ref(),
         );
+        let listed = FrameList::new(&file.frames, &toml_path, &folder, None)?;
+        let size = (camera.width, camera.height);
+        let (listed, orientation_warning) = listed.oriented(size, &file.frames);
         let FrameList {
             frames,
             times_s,
             video,
-        } = FrameList::new(&file.frames, &toml_path, &folder, None)?
-            .turned_to((camera.width, camera.height), &file.frames);
-        if let Some(video) = &video
-            && video.rotation_deg() != 0
-            && file.camera.readout_ms.is_some()
-        {
-            return Err(value(format!(
-                "camera.readout_ms goes from row to row, but {} is displayed with a rotation of \
-                 {}°, so that its rows are not the rows that the sensor \
-                 reads at once; extract the pictures with ffmpeg -noautorotate and calibrate for \
-                 these, or remove readout_ms",
-                printed(video.path()),
-                video.rotation_deg()
-            )));
+        } = listed;
+        if let Some(video) = &video {
+            check_displayed_rows(video, &file).map_err(value)?;
         }
         let mask = match &file.frames.mask {
             Some(mask) => Some(Mask::read(&folder.join(mask), camera.width, camera.height)?),
@@ -206,7 +198,7 @@ impl Survey {
             }
             None => None,
         };
-        warnings.extend(orientation_warning(&survey.file.frames, &survey.frames));
+        warnings.extend(orientation_warning);
         warnings.extend(
             video
                 .iter()
@@ -355,6 +347,20 @@ pub fn toml_path(path: &Path) -> PathBuf {
     } else {
         path.to_owned()
     }
+}
+
+/// Checks that the rows of a rolling shutter are rows of the displayed pictures.
+fn check_displayed_rows(video: &Video, file: &SurveyFile) -> Result<(), String> {
+    if video.rotation_deg() == 0 || file.camera.readout_ms.is_none() {
+        return Ok(());
+    }
+    Err(format!(
+        "camera.readout_ms goes from row to row, but {} is displayed with a rotation of {}°, so \
+         that its rows are not the rows that the sensor reads at once; extract the pictures with \
+         ffmpeg -noautorotate and calibrate for these, or remove readout_ms",
+        printed(video.path()),
+        video.rotation_deg()
+    ))
 }
 
 /// Checks the numbers of a survey's file that stand for themselves; returns what is wrong.

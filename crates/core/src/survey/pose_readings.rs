@@ -4,10 +4,11 @@ use super::error::SurveyError;
 use super::open::Survey;
 use super::pose_reader::{InterpretedPoses, PoseReader};
 use super::pose_validation::feasible_conventions;
+use super::poses_section::PosesSection;
 use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
 use tunnelstitch_geometry::surface::Surface;
-use tunnelstitch_geometry::trajectory::{Convention, Pose, PoseFormat, StampedPose, Trajectory};
+use tunnelstitch_geometry::trajectory::{Pose, PoseFormat, Trajectory};
 
 /// Units that positions may be given in instead of metres: their names, and their lengths, metres.
 const UNITS: [(&str, f64); 3] = [
@@ -41,10 +42,11 @@ pub struct PoseReading {
 }
 
 impl PoseReading {
-    fn of_poses(remedy: String, initial: Trajectory) -> Self {
+    /// A reading of other poses with the pictures as given.
+    fn of_poses(remedy: String, changes: usize, initial: Trajectory) -> Self {
         Self {
             remedy,
-            changes: 1,
+            changes,
             initial,
             orientation: PictureOrientation::Stored,
         }
@@ -64,101 +66,56 @@ impl Survey {
         let given = PoseReader::new(section, &self.folder, &self.frames, times_s)?
             .read(&self.folder.join(&section.initial), section.missing_poses())?;
         let surface = self.surface.as_ref();
-        let mut readings = vec![PoseReading {
-            changes: 0,
-            ..PoseReading::of_poses(String::new(), self.initial.clone())
-        }];
-        for (flags, convention) in feasible_conventions(surface, &given) {
-            readings.push(PoseReading {
-                changes: flags.len(),
-                ..PoseReading::of_poses(flags.join(" and "), given.in_convention(&convention))
+        let as_given = PoseReading::of_poses(String::new(), 0, self.initial.clone());
+        let conventions = feasible_conventions(surface, &given).into_iter();
+        let conventions = conventions.map(|(flags, convention)| {
+            let initial = given.trajectory_in(&convention);
+            PoseReading::of_poses(flags.join(" and "), flags.len(), initial)
+        });
+        let poses = conventions
+            .chain(other_texts(section, &given))
+            .filter(|reading| is_inside(surface, &reading.initial))
+            .map(|reading| PoseReading {
+                initial: self.carried(reading.initial),
+                ..reading
             });
-        }
-        let mut others = Vec::new();
-        if section.quaternion.is_none() && given.format == PoseFormat::Tum {
-            let remedy = "quaternions as w x y z (quaternion = \"wxyz\" under [poses])";
-            others.push((remedy.to_owned(), given.changed(|pose| with_w_first(&pose))));
-        }
-        if section.reversed.is_none() {
-            let remedy = "the poses in reverse order (reversed = true under [poses])";
-            others.push((remedy.to_owned(), given.reversed()));
-        }
-        for (name, unit_m) in UNITS.into_iter().filter(|_| section.unit_m.is_none()) {
-            let remedy = format!("positions in {name} (unit_m = {unit_m} under [poses])");
-            others.push((remedy, given.in_unit(unit_m)));
-        }
-        readings.extend(others.into_iter().map(|(remedy, other)| {
-            PoseReading::of_poses(remedy, other.in_convention(&given.convention))
-        }));
-        readings.retain(|reading| is_inside(surface, &reading.initial));
-        for reading in &mut readings[1..] {
-            reading.initial = self.carried(std::mem::take(&mut reading.initial));
-        }
-        let turned = ORIENTATIONS.map(|(name, orientation)| PoseReading {
+        // Pictures of videos are displayed as they should be.
+        let has_files = self.frames.iter().all(|frame| frame.reading().is_some());
+        let orientations = ORIENTATIONS.into_iter().filter(|_| has_files);
+        let pictures = orientations.map(|(name, orientation)| PoseReading {
             remedy: format!(
                 "{name} (orientation = \"{}\" under [frames])",
                 orientation.name()
             ),
+            changes: 1,
             orientation,
-            ..PoseReading::of_poses(String::new(), self.initial.clone())
+            ..as_given.clone()
         });
-        // Pictures of videos are displayed as they should be.
-        let has_files = self.frames.iter().all(|frame| frame.reading().is_some());
-        readings.extend(turned.into_iter().filter(|_| has_files));
-        Ok(readings)
+        let others = poses.chain(pictures);
+        Ok(std::iter::once(as_given.clone()).chain(others).collect())
     }
 }
 
-impl InterpretedPoses {
-    /// The poses in the tunnel's frame, interpreted in another convention.
-    fn in_convention(&self, convention: &Convention) -> Trajectory {
-        let poses = self.poses_in(convention).into_iter();
-        let stamped = self.given.iter().zip(poses);
-        stamped
-            .map(|(given, pose)| StampedPose {
-                time_s: given.time_s,
-                pose,
-            })
-            .collect()
+/// Readings of the file's text other than that of a section: the order of its quaternions and of
+/// its poses, and its unit.
+fn other_texts(section: &PosesSection, given: &InterpretedPoses) -> Vec<PoseReading> {
+    let mut others = Vec::new();
+    let mut add = |remedy: String, other: InterpretedPoses| {
+        others.push(PoseReading::of_poses(remedy, 1, other.trajectory()));
+    };
+    if section.quaternion.is_none() && given.format == PoseFormat::Tum {
+        let remedy = "quaternions as w x y z (quaternion = \"wxyz\" under [poses])";
+        add(remedy.to_owned(), given.changed(with_w_first));
     }
-
-    /// The file's poses, each changed.
-    fn changed(&self, change: impl Fn(Pose) -> Pose) -> Self {
-        let given = self.given.iter().map(|stamped| StampedPose {
-            time_s: stamped.time_s,
-            pose: change(stamped.pose),
-        });
-        Self {
-            given: given.collect(),
-            convention: self.convention,
-            format: self.format,
-            gaps: self.gaps.clone(),
-        }
+    if section.reversed.is_none() {
+        let remedy = "the poses in reverse order (reversed = true under [poses])";
+        add(remedy.to_owned(), given.reversed());
     }
-
-    /// The file's poses with positions of another unit, metres.
-    pub(super) fn in_unit(&self, unit_m: f64) -> Self {
-        self.changed(|pose| Pose::new(pose.r_wc, pose.t_wc * unit_m))
+    for (name, unit_m) in UNITS.into_iter().filter(|_| section.unit_m.is_none()) {
+        let remedy = format!("positions in {name} (unit_m = {unit_m} under [poses])");
+        add(remedy, given.in_unit(unit_m));
     }
-
-    /// The file's poses in reverse order, at the times of the frames.
-    pub(super) fn reversed(&self) -> Self {
-        let poses = self.given.iter().rev();
-        let given = self
-            .given
-            .iter()
-            .zip(poses)
-            .map(|(at, stamped)| StampedPose {
-                time_s: at.time_s,
-                pose: stamped.pose,
-            });
-        Self {
-            given: given.collect(),
-            convention: self.convention,
-            format: self.format,
-            gaps: self.gaps.clone(),
-        }
-    }
+    others
 }
 
 /// A pose whose quaternion `x y z w` was in truth `w x y z`.

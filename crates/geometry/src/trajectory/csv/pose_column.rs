@@ -48,15 +48,10 @@ impl PoseColumn {
         Self::Qw,
     ];
     /// The columns that every table needs.
-    pub(super) const POSE: [Self; 7] = [
-        Self::Tx,
-        Self::Ty,
-        Self::Tz,
-        Self::Qx,
-        Self::Qy,
-        Self::Qz,
-        Self::Qw,
-    ];
+    pub(super) const POSE: [Self; 7] = {
+        let [_frame, _time_s, _time_ns, pose @ ..] = Self::ALL;
+        pose
+    };
 
     /// The name in survey.toml and in flags.
     pub fn name(self) -> &'static str {
