@@ -29,6 +29,9 @@ use tunnelstitch_geometry::trajectory::StampedPose;
 const MAX_PAIRS: usize = 12;
 /// Smallest number of pairs: fewer may fit by chance.
 const MIN_PAIRS: usize = 4;
+/// Pairs that are registered at once; after each batch a reading that cannot be taken any more is
+/// given up.
+const BATCH: usize = 4;
 /// Evidence below that of the best reading with which another is named beside it, nats: odds of one
 /// to twenty.
 const MAX_DEFICIT_NATS: f64 = 3.0;
@@ -110,15 +113,16 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
     let Some(given) = readings.next() else {
         return Ok(None);
     };
-    let given = pictures.register(survey, &given)?;
+    let comparison = Comparison {
+        given: pictures.register(survey, &given, |_| true)?,
+        least_nats,
+    };
     let mut found = Vec::new();
     for reading in readings {
-        let registered = pictures.register(survey, &reading)?;
-        let evidence = evidence(&registered, &given);
-        let log_odds: f64 = evidence.iter().sum();
-        let fitting = registered.iter().flatten().count();
-        let for_it = evidence.iter().filter(|nats| **nats > 0.0).count();
-        if log_odds > least_nats && 4 * fitting.min(for_it) >= 3 * firsts.len() {
+        let registered = pictures.register(survey, &reading, |some| comparison.may_take(some))?;
+        if comparison.may_take(&registered) {
+            let fitting = registered.iter().flatten().count();
+            let log_odds: f64 = comparison.evidence(&registered).iter().sum();
             found.push((log_odds, fitting, reading));
         }
     }
@@ -132,7 +136,7 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
     Ok(Some(FittingReadings {
         readings: named.map(|(_, _, reading)| reading.remedy).collect(),
         fitting,
-        given: given.iter().flatten().count(),
+        given: comparison.given.iter().flatten().count(),
         pairs: firsts.len(),
         log_odds,
     }))
@@ -141,14 +145,35 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
 /// Deviations of the second frames from their prior, `½ eᵀΣ⁻¹e`; None where a frame does not fit.
 type Registrations = Vec<Option<f64>>;
 
-/// Evidence of each pair for a reading against the one given, nats. A frame that does not fit
-/// deviates by as much as the prior allows.
-fn evidence(reading: &Registrations, given: &Registrations) -> Vec<f64> {
-    let deviation = |registered: &Option<f64>| registered.unwrap_or(MAX_DEVIATION_COST);
-    let pairs = reading.iter().zip(given);
-    pairs
-        .map(|(reading, given)| deviation(given) - deviation(reading))
-        .collect()
+/// What a reading is compared with.
+struct Comparison {
+    /// The pairs in the reading given.
+    given: Registrations,
+    /// Natural logarithm of the odds that a reading must exceed.
+    least_nats: f64,
+}
+
+impl Comparison {
+    /// Evidence of the first pairs for a reading against the one given, nats. A frame that does not
+    /// fit deviates by as much as the prior allows.
+    fn evidence(&self, reading: &[Option<f64>]) -> Vec<f64> {
+        let deviation = |registered: &Option<f64>| registered.unwrap_or(MAX_DEVIATION_COST);
+        let pairs = reading.iter().zip(&self.given);
+        pairs
+            .map(|(reading, given)| deviation(given) - deviation(reading))
+            .collect()
+    }
+
+    /// True if a reading is taken whose first pairs are `reading` and in which all others fit
+    /// without any deviation.
+    fn may_take(&self, reading: &[Option<f64>]) -> bool {
+        let at_best = vec![Some(0.0); self.given.len() - reading.len()];
+        let pairs = [reading, &at_best].concat();
+        let evidence = self.evidence(&pairs);
+        let fitting = pairs.iter().flatten().count();
+        let for_it = evidence.iter().filter(|nats| **nats > 0.0).count();
+        evidence.iter().sum::<f64>() > self.least_nats && 4 * fitting.min(for_it) >= 3 * pairs.len()
+    }
 }
 
 /// The first frames of the pairs: evenly distributed, no frame in two pairs.
@@ -178,11 +203,13 @@ impl Pictures {
         })
     }
 
-    /// Registers the second frame of each pair on the wall that the first one shows.
+    /// Registers the second frame of each pair on the wall that the first one shows, as long as
+    /// `is_wanted` of those before.
     fn register(
         &self,
         survey: &Survey,
         reading: &PoseReading,
+        is_wanted: impl Fn(&[Option<f64>]) -> bool,
     ) -> Result<Registrations, RefineError> {
         let turned = |picture| reading.orientation.turned(picture);
         let mut frames = FrameSet::in_memory(self.pictures.iter().map(turned));
@@ -205,12 +232,16 @@ impl Pictures {
         let setup = Setup::new(input, &options)?;
         // No light is known yet.
         setup.frames.set_light(Light::Normalised);
-        register_pairs(&setup)
+        register_pairs(&setup, is_wanted)
     }
 }
 
-/// Registers frames 1, 3, 5 … on the wall that frames 0, 2, 4 … show.
-fn register_pairs(setup: &Setup) -> Result<Registrations, RefineError> {
+/// Registers frames 1, 3, 5 … on the wall that frames 0, 2, 4 … show, as long as `is_wanted` of
+/// those before.
+fn register_pairs(
+    setup: &Setup,
+    is_wanted: impl Fn(&[Option<f64>]) -> bool,
+) -> Result<Registrations, RefineError> {
     let coarsest = setup.coarsest_level();
     let prescreened = prescreen(&setup.initial_context(0.0), coarsest, &Silent)?;
     let context = setup.initial_context(prescreened.noise);
@@ -221,7 +252,7 @@ fn register_pairs(setup: &Setup) -> Result<Registrations, RefineError> {
         kappa: Kappa::zeros(),
     };
     let footprints = footprints(&context, &states)?;
-    let registered = (0..setup.count() / 2).par_map(|pair| -> Result<Option<f64>, RefineError> {
+    let register = |pair: &usize| -> Result<Option<f64>, RefineError> {
         let frame_range = 2 * pair..2 * pair + 2;
         if states.inliers(&frame_range).contains(&false) {
             return Ok(None);
@@ -246,8 +277,18 @@ fn register_pairs(setup: &Setup) -> Result<Registrations, RefineError> {
             &mut Effort::default(),
         )?;
         Ok(registered.ok().map(|registered| registered.deviation))
-    });
-    registered.into_iter().collect()
+    };
+    let pairs: Vec<usize> = (0..setup.count() / 2).collect();
+    let mut registered = Vec::new();
+    for batch in pairs.chunks(BATCH) {
+        if !is_wanted(&registered) {
+            break;
+        }
+        for one in batch.par_map(register) {
+            registered.push(one?);
+        }
+    }
+    Ok(registered)
 }
 
 #[cfg(test)]
@@ -263,5 +304,22 @@ mod tests {
         assert!(firsts.windows(2).all(|pair| pair[1] >= pair[0] + 2));
         assert!(firsts.iter().all(|first| first + 1 < 1001));
         assert!(first_frames(24).iter().all(|first| first % 2 == 0));
+    }
+
+    #[test]
+    fn a_reading_is_given_up_once_the_other_pairs_cannot_save_it() {
+        let comparison = Comparison {
+            given: vec![Some(3.0); 12],
+            least_nats: 9.5,
+        };
+        assert!(comparison.may_take(&[]));
+        assert!(comparison.may_take(&[Some(1.0); 12]));
+        // Three quarters of the pairs must fit, and speak for it.
+        assert!(comparison.may_take(&[Some(4.0); 3]));
+        assert!(!comparison.may_take(&[Some(4.0); 4]));
+        assert!(!comparison.may_take(&[None; 4]));
+        // A pair that does not fit costs more than the others can make up for here.
+        assert!(!comparison.may_take(&[None]));
+        assert!(!comparison.may_take(&[Some(2.5); 12]));
     }
 }
