@@ -69,11 +69,9 @@ pub mod tracking {
     pub const WINDOW_HELD_DIVISOR: usize = 3;
 
     /// Number of times that a part of tracking is repeated until it settles: all frames with a new
-    /// camera, the first frames with a new shading, the correction of the shading, the closer
-    /// search of a frame.
+    /// camera, the first frames with a new shading, the correction of the shading.
     ///
-    /// Higher: a camera that is farther off can be estimated, frames that are tilted farther are
-    /// found, in more time.
+    /// Higher: a camera that is farther off can be estimated, in more time.
     ///
     /// Chosen by: unknown.
     pub const MAX_TRACKING_ITERATIONS: usize = 5;

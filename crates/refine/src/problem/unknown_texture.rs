@@ -136,9 +136,9 @@ impl WallSpectrum {
             let (column, row) = (k % side, k / side);
             // The spectrum of a real image is symmetric about the origin.
             let square = if column < width {
-                half[row * width + column]
+                half[column * side + row]
             } else {
-                half[(side - row) % side * width + side - column]
+                half[(side - column) * side + (side - row) % side]
             };
             scale * square * smoothing(column) * smoothing(row)
         });

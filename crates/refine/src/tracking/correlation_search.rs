@@ -11,19 +11,17 @@
 //! independent piece of texture.
 
 use crate::model::context::EstimationContext;
-use crate::thresholds::correlation_search::{
-    MIN_OVERLAP_SHARE, PITCH_STEP_RAD, SAMPLES_PER_INDEPENDENT_PIECE,
-};
+use crate::thresholds::correlation_search::{MIN_OVERLAP_SHARE, SAMPLES_PER_INDEPENDENT_PIECE};
 use crate::tracking::correlator::{CorrelationMaximum, Correlator};
 use crate::tracking::reference_mosaic::ReferenceMosaic;
 use crate::tracking::search_across::{SearchAcross, tunnel_axis_in_camera};
-use crate::tracking::search_along::{SearchAlong, tilt_step_rad};
+use crate::tracking::search_along::SearchAlong;
 use crate::tracking::search_grid::{MIN_SEPARATION_STEPS, SearchGrid, Turns};
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use nalgebra::Vector2;
 use rayon::prelude::*;
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{looks_along, mean_radius_m, viewing_distance};
+use tunnelstitch_geometry::surface::{looks_along, viewing_distance};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// Distance on the wall from which on two poses are different, samples: two correlation lengths.
@@ -134,23 +132,6 @@ fn search_grid<'p>(
     let lengths_m = (distance_m, spacing_m);
     let along = SearchAlong::new(context, predicted, tunnel_axis, sigma_rad, lengths_m);
     Some(Box::new(along))
-}
-
-/// Step between the turns that are tried around a pose, radians.
-pub fn turn_step_rad(
-    context: &EstimationContext,
-    camera: &Camera,
-    predicted: &Pose,
-    spacing_m: f64,
-) -> f64 {
-    let surface = context.surface.as_ref();
-    let distance_m = viewing_distance(surface, camera, predicted);
-    match distance_m {
-        Ok(distance_m) if looks_along(surface, predicted) => {
-            tilt_step_rad(mean_radius_m(surface), distance_m, spacing_m)
-        }
-        _ => PITCH_STEP_RAD,
-    }
 }
 
 /// A maximum of the correlation under two turns, with its log-posterior.

@@ -81,14 +81,16 @@ impl Correlator {
             transform.forward(pad_raster(transform, columns, &values, value))
         };
         let (contrast, square, mask) = (spectrum(|v| v), spectrum(|v| v * v), spectrum(|_| 1.0));
-        let product = transform.correlate(&contrast, &self.contrast);
-        let frame_energy = transform.correlate(&square, &self.mask);
-        let mosaic_energy = transform.correlate(&mask, &self.square);
-        let samples = transform.correlate(&mask, &self.mask);
         let (reach_s, reach_h) = (self.reach.0 as i64, self.reach.1 as i64);
-        let (width, height) = (transform.columns as i64, transform.rows as i64);
-        let index =
-            |ds: i64, dh: i64| (dh.rem_euclid(height) * width + ds.rem_euclid(width)) as usize;
+        // A maximum is compared with the shifts around it.
+        let shifts = -reach_h - 1..reach_h + 2;
+        let correlate = |a, b| transform.correlate(a, b, shifts.clone());
+        let product = correlate(&contrast, &self.contrast);
+        let frame_energy = correlate(&square, &self.mask);
+        let mosaic_energy = correlate(&mask, &self.square);
+        let samples = correlate(&mask, &self.mask);
+        let width = transform.columns as i64;
+        let index = |ds: i64, dh: i64| ((dh + reach_h + 1) * width + ds.rem_euclid(width)) as usize;
         let correlation = |ds: i64, dh: i64| -> f32 {
             let k = index(ds, dh);
             let energy = (frame_energy[k] * mosaic_energy[k]).max(0.0).sqrt();

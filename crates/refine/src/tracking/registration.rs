@@ -1,7 +1,7 @@
 //! Registration of one frame on the wall that its neighbours show.
 //!
 //! ```text
-//! correlation search → hypotheses → Gauss–Newton → candidates → closer searches → choice
+//! correlation search → hypotheses → Gauss–Newton → candidates → choice
 //! ```
 
 use crate::model::context::{EstimationContext, FrameWindow};
@@ -15,11 +15,8 @@ use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
 use crate::thresholds::correlation_search::MAX_DEVIATION_SIGMA;
 use crate::thresholds::registration::{MAX_HYPOTHESES, MEAN_HYPOTHESES, MIN_UNEXPLAINED};
-use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::candidate::{Candidate, choose_candidate, sort_candidates, unexplained_share};
-use crate::tracking::correlation_search::{
-    Hypothesis, log_likelihood, search_poses, turn_step_rad,
-};
+use crate::tracking::correlation_search::{Hypothesis, log_likelihood, search_poses};
 use crate::tracking::mosaic_grid::pixel_size_m;
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::PosePrediction;
@@ -40,20 +37,6 @@ use tunnelstitch_geometry::trajectory::Pose;
 /// ([`crate::tracking::correlation_search::attainable_log_likelihood`]) and the lower bound for the
 /// best one, its score before refinement.
 const MAX_SCORE_DEFICIT_NATS: f64 = 9.2;
-
-/// Least gain in log-posterior, nats, for which another closer search is worth its time.
-///
-/// Twice the gain that fitting the six unknowns of a pose to other noise brings follows χ² with six
-/// degrees of freedom (Wilks), whose mean is 6: a smaller gain is noise.
-const MIN_SCORE_GAIN_NATS: f64 = 3.0;
-
-/// Number of hypotheses of a closer search that are refined: the best one and its nearest rival,
-/// which the ambiguity test compares.
-const MAX_CLOSER_HYPOTHESES: usize = 2;
-
-/// Reach of a closer search, steps of the turns: those next to that of the best candidate, and the
-/// half step around them that shifts make up for.
-const CLOSER_SEARCH_STEPS: f64 = 1.5;
 
 /// Deviation `½ eᵀΣ⁻¹e` of a pose from the prior's prediction up to which the prior allows it: all
 /// six unknowns of the pose as far off as the search reaches.
@@ -114,9 +97,8 @@ pub fn register_frame(
     let registration =
         Registration::new(context, options, frame, predicted, neighbours, distance_m)?;
     effort.grant();
-    let hypotheses = registration.search(&predicted.pose, registration.sigma_rad, MAX_HYPOTHESES);
+    let hypotheses = registration.search();
     let mut candidates = registration.refine_hypotheses(&hypotheses, effort)?;
-    registration.search_closer(&mut candidates, effort)?;
     sort_candidates(&mut candidates);
     let camera = context.camera.at_level(registration.search_level);
     let pixel_size =
@@ -196,15 +178,18 @@ impl<'r> Registration<'r> {
         })
     }
 
-    /// Searches around a pose; see [`search_poses`].
-    fn search(&self, pose: &Pose, sigma_rad: [f64; 3], count: usize) -> Vec<Hypothesis> {
-        let Self {
+    /// Searches around the predicted pose; see [`search_poses`].
+    fn search(&self) -> Vec<Hypothesis> {
+        let (context, predicted) = (self.context, &self.predicted.pose);
+        let (mosaic, unwrapped) = (&self.mosaic, &self.unwrapped);
+        search_poses(
             context,
             mosaic,
             unwrapped,
-            ..
-        } = self;
-        search_poses(context, mosaic, unwrapped, pose, sigma_rad, count)
+            predicted,
+            self.sigma_rad,
+            MAX_HYPOTHESES,
+        )
     }
 
     /// Refines the hypotheses that may turn out to be right.
@@ -224,47 +209,6 @@ impl<'r> Registration<'r> {
             candidates.extend(self.refine_pose(&hypothesis.pose)?);
         }
         Ok(candidates)
-    }
-
-    /// Searches again around the best candidate until it is reliable or gains no more.
-    ///
-    /// A pose that is half right has stretched and sheared the picture that it unwraps; from there
-    /// the search correlates better.
-    fn search_closer(
-        &self,
-        candidates: &mut Vec<Candidate>,
-        effort: &mut Effort,
-    ) -> Result<(), ProblemError> {
-        let step_rad = turn_step_rad(
-            self.context,
-            self.unwrapped.camera(),
-            &self.predicted.pose,
-            self.mosaic.grid.spacing_m,
-        );
-        let widest_rad = CLOSER_SEARCH_STEPS * step_rad / MAX_DEVIATION_SIGMA;
-        let sigma_rad = self.sigma_rad.map(|sigma| sigma.min(widest_rad));
-        for _ in 0..MAX_TRACKING_ITERATIONS {
-            sort_candidates(candidates);
-            let first = candidates.first();
-            let Some(first) = first.filter(|c| !c.is_reliable()) else {
-                break;
-            };
-            let (pose, before) = (first.estimate.pose, first.log_posterior());
-            if effort.left == 0 {
-                break;
-            }
-            let closer = self.search(&pose, sigma_rad, MAX_CLOSER_HYPOTHESES);
-            for hypothesis in closer.into_iter().take_while(|_| effort.take()) {
-                candidates.extend(self.refine_pose(&hypothesis.pose)?);
-            }
-            if !candidates
-                .iter()
-                .any(|c| has_gained(before, c.log_posterior()))
-            {
-                break;
-            }
-        }
-        Ok(())
     }
 
     /// Refines a pose by Gauss–Newton down to the level of the search; None if that leads out of
@@ -349,11 +293,6 @@ fn is_worth_refining(hypothesis: &Hypothesis, best_score: f64) -> bool {
     hypothesis.attainable_score >= best_score - MAX_SCORE_DEFICIT_NATS
 }
 
-/// True if a closer search has raised the log-posterior by more than noise does.
-fn has_gained(before: f64, after: f64) -> bool {
-    after - before >= MIN_SCORE_GAIN_NATS
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -391,15 +330,6 @@ mod tests {
             let best = hypothesis(0.0, samples, 1.0).score;
             assert!(is_worth_refining(&hypothesis(0.0, samples, 10.0), best));
             assert!(!is_worth_refining(&hypothesis(0.0, samples, 10.5), best));
-        }
-    }
-
-    #[test]
-    fn gain_is_a_difference_of_log_posteriors() {
-        for before in [-50.0, 0.0, 50.0, 5000.0] {
-            assert!(!has_gained(before, before));
-            assert!(!has_gained(before, before + 2.9));
-            assert!(has_gained(before, before + 3.1));
         }
     }
 }
