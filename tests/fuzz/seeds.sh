@@ -126,6 +126,11 @@ camera_matrix: {rows: 3, cols: 3, data: [415, 0, 318, 0, 417, 241, 0, 0, 1]}
 distortion_model: plumb_bob
 distortion_coefficients: {rows: 1, cols: 5, data: [-0.3, 0.1, 0.001, -0.002, 0]}
 END
+seed calibration gyroflow 0 <<'END'
+{"calib_dimension": {"w": 640, "h": 480}, "frame_readout_time": 15.5, "distortion_model": null, "digital_lens": null,
+ "input_horizontal_stretch": 1.0, "crop": null, "fisheye_params": {"camera_matrix": [[415, 0, 318], [0, 417, 241], [0, 0, 1]],
+ "distortion_coeffs": [-0.01, 0.005, -0.004, 0.0007]}}
+END
 seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
 seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
 seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'

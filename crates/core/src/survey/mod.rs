@@ -94,6 +94,7 @@ mod pose_reader;
 mod pose_readings;
 mod pose_validation;
 mod poses_section;
+mod readout;
 mod shape_file;
 mod template;
 mod tunnel;

@@ -9,6 +9,7 @@ use super::masked_wall::MaskedWall;
 use super::missing_poses::{self, MissingPoses, PoseGap};
 use super::pose_reader::PoseReader;
 use super::poses_section::PosesSection;
+use super::readout::readout_warning;
 use super::shape_file::ShapeFile;
 use super::{ignore, pose_validation};
 use crate::frames::{FrameSet, Mask, Video};
@@ -198,6 +199,7 @@ impl Survey {
             }
             None => None,
         };
+        warnings.extend(readout_warning(&survey.file.camera, &survey.folder));
         warnings.extend(orientation_warning);
         warnings.extend(
             video

@@ -1,6 +1,7 @@
 //! Calibration files: the program's own format (JSON or TOML), OpenCV's YAML, ROS's camera_info,
 //! Kalibr's camchain, the YAML of camodocal and VINS-Fusion, COLMAP's cameras.txt and cameras.bin,
-//! nerfstudio's transforms.json, Basalt's JSON and OCamCalib's calib_results.txt.
+//! nerfstudio's transforms.json, Basalt's JSON, Gyroflow's lens profiles and OCamCalib's
+//! calib_results.txt.
 //!
 //! | file | recognised by | lens | centre of the first pixel |
 //! | --- | --- | --- | --- |
@@ -12,6 +13,7 @@
 //! | COLMAP | `.txt`, `.bin` | PINHOLE … FULL_OPENCV, the fisheyes, THIN_PRISM_FISHEYE, FOV, EUCM | (½, ½) |
 //! | OCamCalib | `.txt` with five lines of numbers | polynomial | (0, 0) |
 //! | Basalt | `.json` with `value0` | `pinhole`, `ds`, `eucm`, `ucm`, `kb4`, `fov` | (0, 0) |
+//! | Gyroflow | `.json` with `fisheye_params` and `calib_dimension` | `opencv_fisheye`, `opencv_standard` | (0, 0) |
 //! | nerfstudio | `.json` with `fl_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
 
 mod basalt;
@@ -22,6 +24,7 @@ mod colmap_binary;
 #[cfg(test)]
 mod colmap_binary_tests;
 mod error;
+mod gyroflow;
 mod kalibr;
 mod lens_keys;
 mod native;
@@ -39,4 +42,4 @@ mod wide_angle_tests;
 
 pub use error::CalibrationError;
 pub use native::format_calibration;
-pub use read::read_calibration;
+pub use read::{read_calibration, stated_readout_ms};

@@ -3,8 +3,8 @@
 use super::error::{CalibrationError, ParseError};
 use super::unknown::unknown_calibration;
 use super::{
-    basalt, camodocal, colmap, colmap_binary, kalibr, native, nerfstudio, ocamcalib, opencv,
-    value_tree,
+    basalt, camodocal, colmap, colmap_binary, gyroflow, kalibr, native, nerfstudio, ocamcalib,
+    opencv, value_tree,
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
@@ -53,6 +53,18 @@ pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, Calib
         .map_err(content)
 }
 
+/// The readout time of a rolling shutter that a calibration file states beside the camera
+/// (Gyroflow's lens profiles do), milliseconds: from the first row to the last, negative in the
+/// other direction. `None` if there is none, or no such file.
+pub fn stated_readout_ms(path: &Path) -> Option<f64> {
+    let bytes = read_regular(path, MAX_CALIBRATION_BYTES).ok()?;
+    let text = String::from_utf8(bytes).ok()?;
+    let tree = value_tree::parse_json(text.trim_start_matches('\u{feff}')).ok()?;
+    gyroflow::is_profile(&tree)
+        .then(|| gyroflow::readout_ms(&tree))
+        .flatten()
+}
+
 fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, ParseError> {
     match extension {
         "yaml" | "yml" => {
@@ -75,6 +87,7 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
         )),
         _ => match value_tree::parse_json(text) {
             Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
+            Ok(tree) if gyroflow::is_profile(&tree) => gyroflow::read(&tree),
             Ok(tree) if basalt::is_basalt(&tree) => basalt::read(&tree, name),
             Ok(tree) if !native::is_native(&tree) => Err(unknown_calibration("")),
             _ => native::read_json(text),
