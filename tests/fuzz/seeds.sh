@@ -131,6 +131,7 @@ seed calibration gyroflow 0 <<'END'
  "input_horizontal_stretch": 1.0, "crop": null, "fisheye_params": {"camera_matrix": [[415, 0, 318], [0, 417, 241], [0, 0, 1]],
  "distortion_coeffs": [-0.01, 0.005, -0.004, 0.0007]}}
 END
+seed calibration angles 0 <<<'{"camera_angle_x": 1.25, "w": 640, "h": 480, "frames": []}'
 seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
 seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
 seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'

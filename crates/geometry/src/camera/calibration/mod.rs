@@ -14,7 +14,7 @@
 //! | OCamCalib | `.txt` with five lines of numbers | polynomial | (0, 0) |
 //! | Basalt | `.json` with `value0` | `pinhole`, `ds`, `eucm`, `ucm`, `kb4`, `fov` | (0, 0) |
 //! | Gyroflow | `.json` with `fisheye_params` and `calib_dimension` | `opencv_fisheye`, `opencv_standard` | (0, 0) |
-//! | nerfstudio | `.json` with `fl_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
+//! | nerfstudio, instant-ngp | `.json` with `fl_x`, `camera_angle_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
 
 mod basalt;
 mod camodocal;
