@@ -132,6 +132,11 @@ seed calibration gyroflow 0 <<'END'
  "distortion_coeffs": [-0.01, 0.005, -0.004, 0.0007]}}
 END
 seed calibration angles 0 <<<'{"camera_angle_x": 1.25, "w": 640, "h": 480, "frames": []}'
+opensfm='[{"cameras": {"v2": {"projection_type": "brown", "width": 640, "height": 480, "focal_x": 0.65, "focal_y": 0.65, "c_x": 0.01,
+ "c_y": 0, "k1": -0.1, "k2": 0.01, "k3": 0, "p1": 0.001, "p2": 0}}, "shots": {"a.png": {"rotation": [0.1, 0.2, 0.3],
+ "translation": [1, 2, 3], "camera": "v2"}}, "points": {}}]'
+seed poses opensfm 0 <<<"$opensfm"
+seed calibration opensfm 0 <<<"$opensfm"
 seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
 seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
 seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'

@@ -78,6 +78,8 @@ enum FormatArgument {
     Nerfstudio,
     /// EuRoC's csv of a body's poses.
     Euroc,
+    /// OpenSfM's reconstruction.json.
+    Opensfm,
 }
 
 /// Names of orders of quaternions.
@@ -127,6 +129,7 @@ impl From<FormatArgument> for PoseFormat {
             FormatArgument::Colmap => Self::Colmap,
             FormatArgument::Nerfstudio => Self::Nerfstudio,
             FormatArgument::Euroc => Self::Euroc,
+            FormatArgument::Opensfm => Self::Opensfm,
         }
     }
 }

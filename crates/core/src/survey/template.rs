@@ -42,7 +42,8 @@ impl Discovery {
             None => writeln!(
                 text,
                 "# No calibration was found: OpenCV, ROS or Kalibr YAML, COLMAP's cameras.txt or \
-                 cameras.bin, nerfstudio's transforms.json, or our camera.json.\n\
+                 cameras.bin, nerfstudio's transforms.json, OpenSfM's reconstruction.json, a lens \
+                 profile of Gyroflow, or our camera.json.\n\
                  file = \"camera.json\""
             ),
         };
@@ -93,7 +94,7 @@ impl Discovery {
     fn write_initial_poses(&self, text: &mut String) {
         let (count, _) = self.frames();
         let Some((path, poses)) = self.initial() else {
-            *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC.\n\
+            *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC or OpenSfM.\n\
                       initial = \"baseline.tum\"\n";
             return;
         };

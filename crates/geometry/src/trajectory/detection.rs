@@ -19,6 +19,11 @@ pub(super) fn detect_format(
     if text.trim_start().starts_with('{') {
         return Ok(PoseFormat::Nerfstudio);
     }
+    if let Some(list) = text.trim_start().strip_prefix('[')
+        && list.trim_start().starts_with(['{', ']'])
+    {
+        return Ok(PoseFormat::Opensfm);
+    }
     let Some((number, line)) = text::lines(text).next() else {
         // Only comments.
         return Err(PoseError::file(path, "holds no poses"));
@@ -51,8 +56,7 @@ pub(super) fn detect_format(
             number,
             format!(
                 "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line), COLMAP, \
-                 nerfstudio nor EuRoC; \
-                 if it is one of them, name it with --pose-format (poses.format in survey.toml)",
+                 nerfstudio, EuRoC nor OpenSfM; if it is one of them, name it with --pose-format (poses.format in survey.toml)",
                 tum::FORM,
                 kitti::FORM,
                 csv::FORM

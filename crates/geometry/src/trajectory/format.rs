@@ -19,13 +19,15 @@ pub enum PoseFormat {
     Nerfstudio,
     /// EuRoC's csv of a body's poses; read only.
     Euroc,
+    /// OpenSfM's reconstruction.json; read only.
+    Opensfm,
 }
 
 impl PoseFormat {
     /// The direction of the format's poses.
     pub fn direction(self) -> Direction {
         match self {
-            Self::Colmap => Direction::WorldToCamera,
+            Self::Colmap | Self::Opensfm => Direction::WorldToCamera,
             _ => Direction::CameraToWorld,
         }
     }

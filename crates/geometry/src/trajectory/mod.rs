@@ -9,6 +9,7 @@
 //! | [`nerfstudio`] | camera-to-world, OpenGL's axes | | yes |
 //! | `colmap_binary` (read only) | world-to-camera, OpenCV's axes | | yes |
 //! | `euroc` (read only) | body-to-world | nanoseconds | |
+//! | `opensfm` (read only) | world-to-camera, OpenCV's axes | | yes |
 //!
 //! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
 //! poses to the tunnel's frame.
@@ -42,6 +43,7 @@ mod jitter;
 pub mod kitti;
 mod mount;
 pub mod nerfstudio;
+mod opensfm;
 mod plan;
 mod pose;
 mod pose_entry;

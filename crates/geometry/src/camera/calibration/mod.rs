@@ -1,6 +1,6 @@
 //! Calibration files: the program's own format (JSON or TOML), OpenCV's YAML, ROS's camera_info,
 //! Kalibr's camchain, the YAML of camodocal and VINS-Fusion, COLMAP's cameras.txt and cameras.bin,
-//! nerfstudio's transforms.json, Basalt's JSON, Gyroflow's lens profiles and OCamCalib's
+//! nerfstudio's transforms.json, OpenSfM's reconstruction.json, Basalt's JSON, Gyroflow's lens profiles and OCamCalib's
 //! calib_results.txt.
 //!
 //! | file | recognised by | lens | centre of the first pixel |
@@ -12,6 +12,7 @@
 //! | camodocal | `.yaml` with `model_type` | `PINHOLE`, `MEI`, `KANNALA_BRANDT` | (0, 0) |
 //! | COLMAP | `.txt`, `.bin` | PINHOLE … FULL_OPENCV, the fisheyes, THIN_PRISM_FISHEYE, FOV, EUCM | (½, ½) |
 //! | OCamCalib | `.txt` with five lines of numbers | polynomial | (0, 0) |
+//! | OpenSfM | `.json` that is a list with `cameras` | `perspective`, `simple_radial`, `radial`, `brown`, `fisheye`, `fisheye_opencv` | normalised |
 //! | Basalt | `.json` with `value0` | `pinhole`, `ds`, `eucm`, `ucm`, `kb4`, `fov` | (0, 0) |
 //! | Gyroflow | `.json` with `fisheye_params` and `calib_dimension` | `opencv_fisheye`, `opencv_standard` | (0, 0) |
 //! | nerfstudio, instant-ngp | `.json` with `fl_x`, `camera_angle_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
@@ -31,6 +32,7 @@ mod native;
 mod nerfstudio;
 mod ocamcalib;
 mod opencv;
+mod opensfm;
 mod read;
 mod selection;
 #[cfg(test)]

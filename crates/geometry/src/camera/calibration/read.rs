@@ -4,7 +4,7 @@ use super::error::{CalibrationError, ParseError};
 use super::unknown::unknown_calibration;
 use super::{
     basalt, camodocal, colmap, colmap_binary, gyroflow, kalibr, native, nerfstudio, ocamcalib,
-    opencv, value_tree,
+    opencv, opensfm, value_tree,
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
@@ -88,6 +88,7 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
         _ => match value_tree::parse_json(text) {
             Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
             Ok(tree) if gyroflow::is_profile(&tree) => gyroflow::read(&tree),
+            Ok(tree) if opensfm::is_reconstruction(&tree) => opensfm::read(&tree, name),
             Ok(tree) if basalt::is_basalt(&tree) => basalt::read(&tree, name),
             Ok(tree) if !native::is_native(&tree) => Err(unknown_calibration("")),
             _ => native::read_json(text),
