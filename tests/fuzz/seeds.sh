@@ -137,6 +137,23 @@ opensfm='[{"cameras": {"v2": {"projection_type": "brown", "width": 640, "height"
  "translation": [1, 2, 3], "camera": "v2"}}, "points": {}}]'
 seed poses opensfm 0 <<<"$opensfm"
 seed calibration opensfm 0 <<<"$opensfm"
+seed poses bundler 0 <<'END'
+# Bundle file v0.3
+2 1
+500 -0.1 0.01
+1 0 0
+0 1 0
+0 0 1
+-1 -2 -3
+0 0 0
+0 0 0
+0 0 0
+0 0 0
+0 0 0
+1.5 2.5 3.5
+255 0 0
+1 0 7 12.5 -3.25
+END
 seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
 seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
 seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'

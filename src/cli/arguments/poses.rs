@@ -80,6 +80,8 @@ enum FormatArgument {
     Euroc,
     /// OpenSfM's reconstruction.json.
     Opensfm,
+    /// Bundler's bundle.out with its list of names.
+    Bundler,
 }
 
 /// Names of orders of quaternions.
@@ -130,6 +132,7 @@ impl From<FormatArgument> for PoseFormat {
             FormatArgument::Nerfstudio => Self::Nerfstudio,
             FormatArgument::Euroc => Self::Euroc,
             FormatArgument::Opensfm => Self::Opensfm,
+            FormatArgument::Bundler => Self::Bundler,
         }
     }
 }

@@ -208,7 +208,7 @@ fn is_calibration(file: &Path, extension: &str) -> bool {
 /// True if a file may hold poses, by its name; `extension` is in lower case.
 fn is_pose_file(file: &Path, extension: &str) -> bool {
     match extension {
-        "txt" | "tum" | "csv" | "json" | "kitti" => true,
+        "txt" | "tum" | "csv" | "json" | "kitti" | "out" => true,
         "bin" => file.ends_with("images.bin"),
         _ => false,
     }

@@ -94,7 +94,8 @@ impl Discovery {
     fn write_initial_poses(&self, text: &mut String) {
         let (count, _) = self.frames();
         let Some((path, poses)) = self.initial() else {
-            *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC or OpenSfM.\n\
+            *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC, OpenSfM or \
+                      Bundler.\n\
                       initial = \"baseline.tum\"\n";
             return;
         };

@@ -4,7 +4,7 @@ use super::error::PoseError;
 use super::format::PoseFormat;
 use super::pose_options::PoseFileOptions;
 use super::quaternion_order::QuaternionOrder;
-use super::{colmap, csv, euroc, kitti, row, text, tum};
+use super::{bundler, colmap, csv, euroc, kitti, row, text, tum};
 use std::path::Path;
 
 /// Detects the format of a pose file from its content.
@@ -23,6 +23,9 @@ pub(super) fn detect_format(
         && list.trim_start().starts_with(['{', ']'])
     {
         return Ok(PoseFormat::Opensfm);
+    }
+    if bundler::is_bundle(text) {
+        return Ok(PoseFormat::Bundler);
     }
     let Some((number, line)) = text::lines(text).next() else {
         // Only comments.
@@ -56,7 +59,7 @@ pub(super) fn detect_format(
             number,
             format!(
                 "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line), COLMAP, \
-                 nerfstudio, EuRoC nor OpenSfM; if it is one of them, name it with --pose-format (poses.format in survey.toml)",
+                 nerfstudio, EuRoC, OpenSfM nor Bundler; if it is one of them, name it with --pose-format (poses.format in survey.toml)",
                 tum::FORM,
                 kitti::FORM,
                 csv::FORM

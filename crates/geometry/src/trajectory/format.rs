@@ -21,13 +21,15 @@ pub enum PoseFormat {
     Euroc,
     /// OpenSfM's reconstruction.json; read only.
     Opensfm,
+    /// Bundler's bundle.out with its list of names; read only.
+    Bundler,
 }
 
 impl PoseFormat {
     /// The direction of the format's poses.
     pub fn direction(self) -> Direction {
         match self {
-            Self::Colmap | Self::Opensfm => Direction::WorldToCamera,
+            Self::Colmap | Self::Opensfm | Self::Bundler => Direction::WorldToCamera,
             _ => Direction::CameraToWorld,
         }
     }
@@ -35,7 +37,7 @@ impl PoseFormat {
     /// The camera axes of the format.
     pub fn axes(self) -> CameraAxes {
         match self {
-            Self::Nerfstudio => CameraAxes::OpenGl,
+            Self::Nerfstudio | Self::Bundler => CameraAxes::OpenGl,
             _ => CameraAxes::OpenCv,
         }
     }

@@ -10,6 +10,7 @@
 //! | `colmap_binary` (read only) | world-to-camera, OpenCV's axes | | yes |
 //! | `euroc` (read only) | body-to-world | nanoseconds | |
 //! | `opensfm` (read only) | world-to-camera, OpenCV's axes | | yes |
+//! | `bundler` (read only) | world-to-camera, OpenGL's axes | | yes |
 //!
 //! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
 //! poses to the tunnel's frame.
@@ -28,6 +29,7 @@
 //! ```
 
 mod axes;
+mod bundler;
 pub mod colmap;
 mod colmap_binary;
 mod convention;

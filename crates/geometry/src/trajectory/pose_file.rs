@@ -6,7 +6,7 @@ use super::format::PoseFormat;
 use super::pose_entry::PoseEntry;
 use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
-use super::{colmap, colmap_binary, csv, euroc, kitti, nerfstudio, opensfm, text, tum};
+use super::{bundler, colmap, colmap_binary, csv, euroc, kitti, nerfstudio, opensfm, text, tum};
 use std::path::{Path, PathBuf};
 
 /// A file of poses, in its own convention, with at least one pose. Times, if present, increase;
@@ -113,6 +113,7 @@ fn read_text(
         PoseFormat::Nerfstudio => nerfstudio::parse(path, &text),
         PoseFormat::Euroc => euroc::parse(path, &text, duplicates),
         PoseFormat::Opensfm => opensfm::parse(path, &text),
+        PoseFormat::Bundler => bundler::parse(path, &text),
     }?;
     Ok((format, entries))
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use tunnelstitch::survey::{Associate, Survey};
 use tunnelstitch::trajectory::{Pose, PoseFormat, read_poses};
 
-const FORMATS: [Option<PoseFormat>; 8] = [
+const FORMATS: [Option<PoseFormat>; 9] = [
     None,
     Some(PoseFormat::Tum),
     Some(PoseFormat::Kitti),
@@ -15,6 +15,7 @@ const FORMATS: [Option<PoseFormat>; 8] = [
     Some(PoseFormat::Nerfstudio),
     Some(PoseFormat::Euroc),
     Some(PoseFormat::Opensfm),
+    Some(PoseFormat::Bundler),
 ];
 const TIES: [Option<Associate>; 4] = [
     None,

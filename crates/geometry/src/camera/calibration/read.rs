@@ -80,6 +80,11 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
         "txt" if ocamcalib::is_ocamcalib(text) => ocamcalib::read(text),
         "txt" if colmap::has_no_model(text) => Err(unknown_calibration("")),
         "txt" => colmap::read(text, name),
+        "out" => Err(ParseError::new(
+            "a bundle file has no size of its pictures; write a camera.json with it: the model \
+             brown-conrady, fx and fy the first number of a camera, k1 and k2 the other two, cx = \
+             (width − 1) / 2, cy = (height − 1) / 2",
+        )),
         "toml" => native::read_toml(text),
         "xml" => Err(ParseError::new(
             "OpenCV's XML is not supported; save the calibration as YAML (a name that ends in \
