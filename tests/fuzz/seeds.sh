@@ -154,6 +154,19 @@ seed poses bundler 0 <<'END'
 255 0 0
 1 0 7 12.5 -3.25
 END
+meshroom='{"version": ["1", "2", "6"], "views": [{"viewId": "1", "poseId": "2", "intrinsicId": "3", "path": "a.png"}],
+ "intrinsics": [{"intrinsicId": "3", "width": "640", "height": "480", "sensorWidth": "36", "type": "radial3", "focalLength": "24",
+ "pixelRatio": "1", "principalPoint": ["-2", "1"], "distortionParams": ["-0.1", "0.01", "0"]}], "poses": [{"poseId": "2",
+ "pose": {"transform": {"rotation": ["0", "0", "1", "-1", "0", "0", "0", "-1", "0"], "center": ["1", "2", "3"]}, "locked": "0"}}]}'
+seed poses meshroom 0 <<<"$meshroom"
+seed calibration meshroom 0 <<<"$meshroom"
+openmvg='{"sfm_data_version": "0.3", "root_path": "", "views": [{"key": 0, "value": {"ptr_wrapper": {"data": {"local_path": "", "filename":
+ "a.png", "width": 640, "height": 480, "id_view": 0, "id_intrinsic": 4, "id_pose": 5}}}}], "intrinsics": [{"key": 4, "value":
+ {"polymorphic_name": "pinhole_radial_k3", "ptr_wrapper": {"data": {"width": 640, "height": 480, "focal_length": 415,
+ "principal_point": [318, 241], "disto_k3": [-0.1, 0.01, 0]}}}}], "extrinsics": [{"key": 5, "value": {"rotation":
+ [[0, -1, 0], [0, 0, -1], [1, 0, 0]], "center": [1, 2, 3]}}]}'
+seed poses openmvg 0 <<<"$openmvg"
+seed calibration openmvg 0 <<<"$openmvg"
 seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
 seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
 seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'

@@ -82,6 +82,10 @@ enum FormatArgument {
     Opensfm,
     /// Bundler's bundle.out with its list of names.
     Bundler,
+    /// Meshroom's cameras.sfm.
+    Meshroom,
+    /// OpenMVG's sfm_data.json.
+    Openmvg,
 }
 
 /// Names of orders of quaternions.
@@ -133,6 +137,8 @@ impl From<FormatArgument> for PoseFormat {
             FormatArgument::Euroc => Self::Euroc,
             FormatArgument::Opensfm => Self::Opensfm,
             FormatArgument::Bundler => Self::Bundler,
+            FormatArgument::Meshroom => Self::Meshroom,
+            FormatArgument::Openmvg => Self::Openmvg,
         }
     }
 }

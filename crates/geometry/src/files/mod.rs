@@ -5,11 +5,13 @@
 //! | --- | --- |
 //! | opening and reading of regular files | [`regular`] |
 //! | numbers and names of binary files | [`binary`] |
+//! | numbers of JSON files | [`json`] |
 //! | largest sizes of text files | [`limits`] |
 //! | files that are locked or appended to, and targets that may be replaced | [`targets`] |
 //! | names and texts without control characters | [`printed()`] |
 
 pub mod binary;
+pub mod json;
 pub mod limits;
 pub mod printed;
 pub mod regular;

@@ -86,7 +86,8 @@ fn parse_poses(path: &Path, text: &str) -> Result<Vec<Option<Pose>>, PoseError> 
         for (k, value) in values.iter_mut().enumerate() {
             let (number, word) = words.next().ok_or_else(ends)?;
             line = if k == 0 { number } else { line };
-            *value = text::number(word, FORM).map_err(|what| PoseError::line(path, number, what))?;
+            *value =
+                text::number(word, FORM).map_err(|what| PoseError::line(path, number, what))?;
         }
         poses.push(camera(&values).map_err(|what| PoseError::line(path, line, what))?);
     }
@@ -164,16 +165,26 @@ mod tests {
         ] {
             let file = read(&files).unwrap();
             assert_eq!(file.format, PoseFormat::Bundler);
-            let names: Vec<_> = file.entries.iter().flat_map(|entry| entry.name.as_deref()).collect();
+            let names: Vec<_> = file
+                .entries
+                .iter()
+                .flat_map(|entry| entry.name.as_deref())
+                .collect();
             assert_eq!(names, ["./a b.jpg", "./c.jpg"]);
             let convention = Convention::of(file.format);
             let [first, last] = [0, 1].map(|k| convention.to_world(&file.entries[k].pose));
             assert_eq!(first.t_wc, Vector3::new(1.0, 2.0, 3.0));
             // Two metres ahead (−z), one up: y is −1 in OpenCV's axes.
             let seen = first.to_camera(&Vector3::new(1.0, 3.0, 1.0));
-            assert!((seen - Vector3::new(0.0, -1.0, 2.0)).norm() < 1e-12, "{seen}");
+            assert!(
+                (seen - Vector3::new(0.0, -1.0, 2.0)).norm() < 1e-12,
+                "{seen}"
+            );
             let seen = last.to_camera(&Vector3::new(-2.0, 0.0, -1.0));
-            assert!((seen - Vector3::new(1.0, 0.0, 2.0)).norm() < 1e-12, "{seen}");
+            assert!(
+                (seen - Vector3::new(1.0, 0.0, 2.0)).norm() < 1e-12,
+                "{seen}"
+            );
         }
     }
 
@@ -187,15 +198,24 @@ mod tests {
             (changed("0 1 0", "0 y 0"), "out:5: `y` is not a number"),
             (changed("1 0 0", "2 0 0"), "out:3: its first three columns"),
             ("# Bundle file v0.3\n2 0\n1 0 0\n".to_owned(), "cut off"),
-            ("# Bundle file v0.3\n0 0\n".to_owned(), "list.txt: 3 names for the 0"),
+            (
+                "# Bundle file v0.3\n0 0\n".to_owned(),
+                "list.txt: 3 names for the 0",
+            ),
             (changed("3 1", "2 1"), "list.txt: 3 names for the 2 cameras"),
         ] {
             let message = read(&[("bundle.out", &text), list]).unwrap_err();
             assert!(message.contains(expected), "{message}");
         }
         let message = read(&[("bundle.out", BUNDLE)]).unwrap_err();
-        assert!(message.contains("put their list, list.txt, beside it"), "{message}");
+        assert!(
+            message.contains("put their list, list.txt, beside it"),
+            "{message}"
+        );
         let message = read(&[("bundle.out", BUNDLE), ("list.txt", "a\nb\na\n")]).unwrap_err();
-        assert!(message.contains("list.txt: a second pose of a"), "{message}");
+        assert!(
+            message.contains("list.txt: a second pose of a"),
+            "{message}"
+        );
     }
 }

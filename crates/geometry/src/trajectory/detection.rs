@@ -5,6 +5,8 @@ use super::format::PoseFormat;
 use super::pose_options::PoseFileOptions;
 use super::quaternion_order::QuaternionOrder;
 use super::{bundler, colmap, csv, euroc, kitti, row, text, tum};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 use std::path::Path;
 
 /// Detects the format of a pose file from its content.
@@ -17,7 +19,7 @@ pub(super) fn detect_format(
     options: &PoseFileOptions,
 ) -> Result<PoseFormat, PoseError> {
     if text.trim_start().starts_with('{') {
-        return Ok(PoseFormat::Nerfstudio);
+        return Ok(detect_json(text));
     }
     if let Some(list) = text.trim_start().strip_prefix('[')
         && list.trim_start().starts_with(['{', ']'])
@@ -59,11 +61,28 @@ pub(super) fn detect_format(
             number,
             format!(
                 "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line), COLMAP, \
-                 nerfstudio, EuRoC, OpenSfM nor Bundler; if it is one of them, name it with --pose-format (poses.format in survey.toml)",
+                 nerfstudio, EuRoC, OpenSfM, Bundler, Meshroom nor OpenMVG; if it is one of them, name it with --pose-format (poses.format in survey.toml)",
                 tum::FORM,
                 kitti::FORM,
                 csv::FORM
             ),
         )),
+    }
+}
+
+/// Keys at the top of JSON files, without their values.
+#[derive(Default, Deserialize)]
+struct TopKeys {
+    poses: Option<IgnoredAny>,
+    extrinsics: Option<IgnoredAny>,
+}
+
+/// Detects the format of a JSON object; what is none is left to the parser of nerfstudio's.
+fn detect_json(text: &str) -> PoseFormat {
+    let keys: TopKeys = serde_json::from_str(text).unwrap_or_default();
+    match (keys.poses, keys.extrinsics) {
+        (Some(_), None) => PoseFormat::Meshroom,
+        (None, Some(_)) => PoseFormat::Openmvg,
+        _ => PoseFormat::Nerfstudio,
     }
 }

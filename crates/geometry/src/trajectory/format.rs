@@ -23,13 +23,19 @@ pub enum PoseFormat {
     Opensfm,
     /// Bundler's bundle.out with its list of names; read only.
     Bundler,
+    /// Meshroom's cameras.sfm; read only.
+    Meshroom,
+    /// OpenMVG's sfm_data.json; read only.
+    Openmvg,
 }
 
 impl PoseFormat {
     /// The direction of the format's poses.
     pub fn direction(self) -> Direction {
         match self {
-            Self::Colmap | Self::Opensfm | Self::Bundler => Direction::WorldToCamera,
+            Self::Colmap | Self::Opensfm | Self::Bundler | Self::Meshroom | Self::Openmvg => {
+                Direction::WorldToCamera
+            }
             _ => Direction::CameraToWorld,
         }
     }

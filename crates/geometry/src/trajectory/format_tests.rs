@@ -107,8 +107,12 @@ proptest! {
     fn no_text_makes_it_panic(text in "[-0-9eE.,;\\[\\]{}\" #a-zA-Z\n\r\t]{0,200}") {
         let (_dir, path) = file_of(text.as_bytes());
         let _ = read_poses(&path, None);
-        use PoseFormat::{Bundler, Colmap, Csv, Euroc, Kitti, Nerfstudio, Opensfm, Tum};
-        for format in [Tum, Kitti, Csv, Colmap, Nerfstudio, Euroc, Opensfm, Bundler] {
+        use PoseFormat::{
+            Bundler, Colmap, Csv, Euroc, Kitti, Meshroom, Nerfstudio, Openmvg, Opensfm, Tum,
+        };
+        for format in [
+            Tum, Kitti, Csv, Colmap, Nerfstudio, Euroc, Opensfm, Bundler, Meshroom, Openmvg,
+        ] {
             let _ = read_poses(&path, Some(format));
         }
     }

@@ -11,6 +11,8 @@
 //! | `euroc` (read only) | body-to-world | nanoseconds | |
 //! | `opensfm` (read only) | world-to-camera, OpenCV's axes | | yes |
 //! | `bundler` (read only) | world-to-camera, OpenGL's axes | | yes |
+//! | `meshroom` (read only) | world-to-camera, OpenCV's axes | | yes |
+//! | `openmvg` (read only) | world-to-camera, OpenCV's axes | | yes |
 //!
 //! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
 //! poses to the tunnel's frame.
@@ -43,8 +45,10 @@ mod format;
 pub mod gyro;
 mod jitter;
 pub mod kitti;
+mod meshroom;
 mod mount;
 pub mod nerfstudio;
+mod openmvg;
 mod opensfm;
 mod plan;
 mod pose;

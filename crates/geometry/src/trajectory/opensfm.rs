@@ -29,7 +29,10 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
     let parts: Vec<Reconstruction> =
         serde_json::from_str(text).map_err(|error| fail(error.to_string()))?;
     if parts.len() > 1 {
-        let counts: Vec<String> = parts.iter().map(|part| part.shots.len().to_string()).collect();
+        let counts: Vec<String> = parts
+            .iter()
+            .map(|part| part.shots.len().to_string())
+            .collect();
         return Err(fail(format!(
             "holds {} reconstructions (of {} shots), each in a world of its own; leave the one of \
              the survey",
@@ -93,7 +96,10 @@ mod tests {
         let pose = Convention::of(file.format).to_world(&file.entries[1].pose);
         assert!((pose.t_wc - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-12);
         let seen = pose.to_camera(&Vector3::new(5.0, 2.5, 3.0));
-        assert!((seen - Vector3::new(0.0, 0.5, 4.0)).norm() < 1e-12, "{seen}");
+        assert!(
+            (seen - Vector3::new(0.0, 0.5, 4.0)).norm() < 1e-12,
+            "{seen}"
+        );
     }
 
     #[test]
@@ -104,7 +110,10 @@ mod tests {
             (two, "holds 2 reconstructions (of 1, 0 shots)"),
             ("[]", "holds no poses"),
             ("[{", "line 1 column 2"),
-            (r#"[{"shots": {"a": {"rotation": [0, 0, 0]}}}]"#, "missing field `translation`"),
+            (
+                r#"[{"shots": {"a": {"rotation": [0, 0, 0]}}}]"#,
+                "missing field `translation`",
+            ),
             (
                 r#"[{"shots": {"a": {"rotation": [1e300, 0, 1e300], "translation": [0, 0, 0]}}}]"#,
                 "shot a: its rotation",

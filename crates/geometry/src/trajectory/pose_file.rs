@@ -6,7 +6,10 @@ use super::format::PoseFormat;
 use super::pose_entry::PoseEntry;
 use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
-use super::{bundler, colmap, colmap_binary, csv, euroc, kitti, nerfstudio, opensfm, text, tum};
+use super::{
+    bundler, colmap, colmap_binary, csv, euroc, kitti, meshroom, nerfstudio, openmvg, opensfm,
+    text, tum,
+};
 use std::path::{Path, PathBuf};
 
 /// A file of poses, in its own convention, with at least one pose. Times, if present, increase;
@@ -114,6 +117,8 @@ fn read_text(
         PoseFormat::Euroc => euroc::parse(path, &text, duplicates),
         PoseFormat::Opensfm => opensfm::parse(path, &text),
         PoseFormat::Bundler => bundler::parse(path, &text),
+        PoseFormat::Meshroom => meshroom::parse(path, &text),
+        PoseFormat::Openmvg => openmvg::parse(path, &text),
     }?;
     Ok((format, entries))
 }

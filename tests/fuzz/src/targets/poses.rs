@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use tunnelstitch::survey::{Associate, Survey};
 use tunnelstitch::trajectory::{Pose, PoseFormat, read_poses};
 
-const FORMATS: [Option<PoseFormat>; 9] = [
+const FORMATS: [Option<PoseFormat>; 11] = [
     None,
     Some(PoseFormat::Tum),
     Some(PoseFormat::Kitti),
@@ -16,6 +16,8 @@ const FORMATS: [Option<PoseFormat>; 9] = [
     Some(PoseFormat::Euroc),
     Some(PoseFormat::Opensfm),
     Some(PoseFormat::Bundler),
+    Some(PoseFormat::Meshroom),
+    Some(PoseFormat::Openmvg),
 ];
 const TIES: [Option<Associate>; 4] = [
     None,

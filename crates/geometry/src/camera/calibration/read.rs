@@ -3,8 +3,8 @@
 use super::error::{CalibrationError, ParseError};
 use super::unknown::unknown_calibration;
 use super::{
-    basalt, camodocal, colmap, colmap_binary, gyroflow, kalibr, native, nerfstudio, ocamcalib,
-    opencv, opensfm, value_tree,
+    basalt, camodocal, colmap, colmap_binary, gyroflow, kalibr, meshroom, native, nerfstudio,
+    ocamcalib, opencv, openmvg, opensfm, value_tree,
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
@@ -94,6 +94,8 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
             Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
             Ok(tree) if gyroflow::is_profile(&tree) => gyroflow::read(&tree),
             Ok(tree) if opensfm::is_reconstruction(&tree) => opensfm::read(&tree, name),
+            Ok(tree) if openmvg::is_sfm_data(&tree) => openmvg::read(&tree, name),
+            Ok(tree) if meshroom::is_sfm(&tree) => meshroom::read(&tree, name),
             Ok(tree) if basalt::is_basalt(&tree) => basalt::read(&tree, name),
             Ok(tree) if !native::is_native(&tree) => Err(unknown_calibration("")),
             _ => native::read_json(text),
