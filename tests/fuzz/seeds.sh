@@ -167,6 +167,14 @@ openmvg='{"sfm_data_version": "0.3", "root_path": "", "views": [{"key": 0, "valu
  [[0, -1, 0], [0, 0, -1], [1, 0, 0]], "center": [1, 2, 3]}}]}'
 seed poses openmvg 0 <<<"$openmvg"
 seed calibration openmvg 0 <<<"$openmvg"
+metashape='<document version="2.0.0"><chunk><sensors><sensor id="0" type="frame"><calibration type="frame" class="adjusted">
+<resolution width="640" height="480"/><f>415</f><cx>-2</cx><cy>1</cy><k1>-0.1</k1></calibration></sensor></sensors><cameras>
+<camera id="0" sensor_id="0" component_id="0" label="a"><transform>0 0 1 1 -1 0 0 2 0 -1 0 3 0 0 0 1</transform></camera></cameras>
+<transform><rotation>0 -1 0 1 0 0 0 0 1</rotation><translation>10 0 0</translation><scale>2</scale></transform></chunk></document>'
+seed poses metashape 0 <<<"$metashape"
+seed calibration metashape 5 <<<"$metashape"
+seed poses realitycapture 0 <<<$'#name,x,y,alt,heading,pitch,roll,f\na.png,1,2,3,10,90,-5,35'
+seed poses pix4d 0 <<<$'imageName X Y Z Omega Phi Kappa\na.png 1 2 3 90 10 -5'
 seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
 seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
 seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'

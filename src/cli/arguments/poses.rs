@@ -86,6 +86,12 @@ enum FormatArgument {
     Meshroom,
     /// OpenMVG's sfm_data.json.
     Openmvg,
+    /// Metashape's cameras in XML.
+    Metashape,
+    /// RealityCapture's CSV of cameras.
+    Realitycapture,
+    /// Pix4D's calibrated external camera parameters.
+    Pix4d,
 }
 
 /// Names of orders of quaternions.
@@ -139,6 +145,9 @@ impl From<FormatArgument> for PoseFormat {
             FormatArgument::Bundler => Self::Bundler,
             FormatArgument::Meshroom => Self::Meshroom,
             FormatArgument::Openmvg => Self::Openmvg,
+            FormatArgument::Metashape => Self::Metashape,
+            FormatArgument::Realitycapture => Self::Realitycapture,
+            FormatArgument::Pix4d => Self::Pix4d,
         }
     }
 }

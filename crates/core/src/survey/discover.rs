@@ -199,7 +199,7 @@ impl Discovery {
 /// True if a file may be a calibration, by its name; `extension` is in lower case.
 fn is_calibration(file: &Path, extension: &str) -> bool {
     match extension {
-        "json" | "toml" | "yaml" | "yml" | "txt" | "sfm" => true,
+        "json" | "toml" | "yaml" | "yml" | "txt" | "sfm" | "xml" => true,
         "bin" => file.ends_with("cameras.bin"),
         _ => false,
     }
@@ -208,7 +208,7 @@ fn is_calibration(file: &Path, extension: &str) -> bool {
 /// True if a file may hold poses, by its name; `extension` is in lower case.
 fn is_pose_file(file: &Path, extension: &str) -> bool {
     match extension {
-        "txt" | "tum" | "csv" | "json" | "kitti" | "out" | "sfm" => true,
+        "txt" | "tum" | "csv" | "json" | "kitti" | "out" | "sfm" | "xml" => true,
         "bin" => file.ends_with("images.bin"),
         _ => false,
     }

@@ -42,8 +42,8 @@ impl Discovery {
             None => writeln!(
                 text,
                 "# No calibration was found: OpenCV, ROS or Kalibr YAML, COLMAP's cameras.txt or \
-                 cameras.bin, nerfstudio's transforms.json, the files of OpenSfM, OpenMVG or \
-                 Meshroom, a lens profile of Gyroflow, or our camera.json.\n\
+                 cameras.bin, nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, \
+                 Meshroom or Metashape, a lens profile of Gyroflow, or our camera.json.\n\
                  file = \"camera.json\""
             ),
         };
@@ -95,7 +95,7 @@ impl Discovery {
         let (count, _) = self.frames();
         let Some((path, poses)) = self.initial() else {
             *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC, OpenSfM, \
-                      Bundler, Meshroom or OpenMVG.\n\
+                      Bundler, Meshroom, OpenMVG, Metashape, RealityCapture or Pix4D.\n\
                       initial = \"baseline.tum\"\n";
             return;
         };

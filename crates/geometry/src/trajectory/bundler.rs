@@ -132,7 +132,6 @@ fn parse_names(text: &str) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::trajectory::{Convention, PoseFile, PoseFormat, read_poses};
     use nalgebra::Vector3;
 

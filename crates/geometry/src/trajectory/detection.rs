@@ -4,7 +4,7 @@ use super::error::PoseError;
 use super::format::PoseFormat;
 use super::pose_options::PoseFileOptions;
 use super::quaternion_order::QuaternionOrder;
-use super::{bundler, colmap, csv, euroc, kitti, row, text, tum};
+use super::{bundler, colmap, csv, euroc, kitti, metashape, pix4d, realitycapture, row, text, tum};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::path::Path;
@@ -26,6 +26,12 @@ pub(super) fn detect_format(
     {
         return Ok(PoseFormat::Opensfm);
     }
+    if metashape::is_xml(text) {
+        return Ok(PoseFormat::Metashape);
+    }
+    if realitycapture::is_table(text) && options.columns.is_empty() {
+        return Ok(PoseFormat::Realitycapture);
+    }
     if bundler::is_bundle(text) {
         return Ok(PoseFormat::Bundler);
     }
@@ -33,6 +39,9 @@ pub(super) fn detect_format(
         // Only comments.
         return Err(PoseError::file(path, "holds no poses"));
     };
+    if pix4d::is_header(line) {
+        return Ok(PoseFormat::Pix4d);
+    }
     let order = options
         .quaternion
         .or_else(|| QuaternionOrder::of_comments(text));
@@ -60,8 +69,10 @@ pub(super) fn detect_format(
             path,
             number,
             format!(
-                "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line), COLMAP, \
-                 nerfstudio, EuRoC, OpenSfM, Bundler, Meshroom nor OpenMVG; if it is one of them, name it with --pose-format (poses.format in survey.toml)",
+                "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line) nor a file \
+                 of COLMAP, nerfstudio, EuRoC, OpenSfM, Bundler, Meshroom, OpenMVG, Metashape, \
+                 RealityCapture or Pix4D; if it is one of them, name it with --pose-format \
+                 (poses.format in survey.toml)",
                 tum::FORM,
                 kitti::FORM,
                 csv::FORM

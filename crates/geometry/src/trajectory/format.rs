@@ -27,6 +27,12 @@ pub enum PoseFormat {
     Meshroom,
     /// OpenMVG's sfm_data.json; read only.
     Openmvg,
+    /// Metashape's cameras in XML; read only.
+    Metashape,
+    /// RealityCapture's CSV of cameras; read only.
+    Realitycapture,
+    /// Pix4D's calibrated external camera parameters; read only.
+    Pix4d,
 }
 
 impl PoseFormat {
@@ -43,7 +49,9 @@ impl PoseFormat {
     /// The camera axes of the format.
     pub fn axes(self) -> CameraAxes {
         match self {
-            Self::Nerfstudio | Self::Bundler => CameraAxes::OpenGl,
+            Self::Nerfstudio | Self::Bundler | Self::Realitycapture | Self::Pix4d => {
+                CameraAxes::OpenGl
+            }
             _ => CameraAxes::OpenCv,
         }
     }

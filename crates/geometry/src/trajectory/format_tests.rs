@@ -108,10 +108,23 @@ proptest! {
         let (_dir, path) = file_of(text.as_bytes());
         let _ = read_poses(&path, None);
         use PoseFormat::{
-            Bundler, Colmap, Csv, Euroc, Kitti, Meshroom, Nerfstudio, Openmvg, Opensfm, Tum,
+            Bundler, Colmap, Csv, Euroc, Kitti, Meshroom, Metashape, Nerfstudio, Openmvg, Opensfm,
+            Pix4d, Realitycapture, Tum,
         };
         for format in [
-            Tum, Kitti, Csv, Colmap, Nerfstudio, Euroc, Opensfm, Bundler, Meshroom, Openmvg,
+            Tum,
+            Kitti,
+            Csv,
+            Colmap,
+            Nerfstudio,
+            Euroc,
+            Opensfm,
+            Bundler,
+            Meshroom,
+            Openmvg,
+            Metashape,
+            Realitycapture,
+            Pix4d,
         ] {
             let _ = read_poses(&path, Some(format));
         }

@@ -13,6 +13,9 @@
 //! | `bundler` (read only) | world-to-camera, OpenGL's axes | | yes |
 //! | `meshroom` (read only) | world-to-camera, OpenCV's axes | | yes |
 //! | `openmvg` (read only) | world-to-camera, OpenCV's axes | | yes |
+//! | `metashape` (read only) | camera-to-world, OpenCV's axes | | yes |
+//! | `realitycapture` (read only) | camera-to-world, OpenGL's axes | | yes |
+//! | `pix4d` (read only) | camera-to-world, OpenGL's axes | | yes |
 //!
 //! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
 //! poses to the tunnel's frame.
@@ -46,16 +49,19 @@ pub mod gyro;
 mod jitter;
 pub mod kitti;
 mod meshroom;
+mod metashape;
 mod mount;
 pub mod nerfstudio;
 mod openmvg;
 mod opensfm;
+mod pix4d;
 mod plan;
 mod pose;
 mod pose_entry;
 mod pose_file;
 mod pose_options;
 mod quaternion_order;
+mod realitycapture;
 mod rigid;
 mod row;
 pub mod se3;

@@ -7,8 +7,8 @@ use super::pose_entry::PoseEntry;
 use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
 use super::{
-    bundler, colmap, colmap_binary, csv, euroc, kitti, meshroom, nerfstudio, openmvg, opensfm,
-    text, tum,
+    bundler, colmap, colmap_binary, csv, euroc, kitti, meshroom, metashape, nerfstudio, openmvg,
+    opensfm, pix4d, realitycapture, text, tum,
 };
 use std::path::{Path, PathBuf};
 
@@ -79,6 +79,10 @@ pub fn read_poses_with(path: &Path, options: &PoseFileOptions) -> Result<PoseFil
     if entries.is_empty() {
         return Err(PoseError::file(&path, "holds no poses"));
     }
+    if let Some(k) = entries.iter().position(|entry| !entry.pose.is_finite()) {
+        let what = format!("pose {}: its numbers are too large", k + 1);
+        return Err(PoseError::file(&path, what));
+    }
     Ok(PoseFile {
         path,
         format,
@@ -119,6 +123,9 @@ fn read_text(
         PoseFormat::Bundler => bundler::parse(path, &text),
         PoseFormat::Meshroom => meshroom::parse(path, &text),
         PoseFormat::Openmvg => openmvg::parse(path, &text),
+        PoseFormat::Metashape => metashape::parse(path, &text),
+        PoseFormat::Realitycapture => realitycapture::parse(path, &text),
+        PoseFormat::Pix4d => pix4d::parse(path, &text),
     }?;
     Ok((format, entries))
 }

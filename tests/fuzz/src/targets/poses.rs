@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use tunnelstitch::survey::{Associate, Survey};
 use tunnelstitch::trajectory::{Pose, PoseFormat, read_poses};
 
-const FORMATS: [Option<PoseFormat>; 11] = [
+const FORMATS: [Option<PoseFormat>; 14] = [
     None,
     Some(PoseFormat::Tum),
     Some(PoseFormat::Kitti),
@@ -18,6 +18,9 @@ const FORMATS: [Option<PoseFormat>; 11] = [
     Some(PoseFormat::Bundler),
     Some(PoseFormat::Meshroom),
     Some(PoseFormat::Openmvg),
+    Some(PoseFormat::Metashape),
+    Some(PoseFormat::Realitycapture),
+    Some(PoseFormat::Pix4d),
 ];
 const TIES: [Option<Associate>; 4] = [
     None,

@@ -3,8 +3,8 @@
 use super::error::{CalibrationError, ParseError};
 use super::unknown::unknown_calibration;
 use super::{
-    basalt, camodocal, colmap, colmap_binary, gyroflow, kalibr, meshroom, native, nerfstudio,
-    ocamcalib, opencv, openmvg, opensfm, value_tree,
+    basalt, camodocal, colmap, colmap_binary, gyroflow, kalibr, meshroom, metashape, native,
+    nerfstudio, ocamcalib, opencv, openmvg, opensfm, value_tree,
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
@@ -86,6 +86,7 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
              (width − 1) / 2, cy = (height − 1) / 2",
         )),
         "toml" => native::read_toml(text),
+        "xml" if !text.contains("<opencv_storage") => metashape::read(text, name),
         "xml" => Err(ParseError::new(
             "OpenCV's XML is not supported; save the calibration as YAML (a name that ends in \
              .yml)",
