@@ -175,6 +175,7 @@ seed poses metashape 0 <<<"$metashape"
 seed calibration metashape 5 <<<"$metashape"
 seed poses realitycapture 0 <<<$'#name,x,y,alt,heading,pitch,roll,f\na.png,1,2,3,10,90,-5,35'
 seed poses pix4d 0 <<<$'imageName X Y Z Omega Phi Kappa\na.png 1 2 3 90 10 -5'
+seed gyro colon 0 <<<$'GYROFLOW IMU LOG\nversion:1.1\norientation,YxZ\ntscale,0.1\ngscale,0.01\nt,gx,gy,gz\n0,1,2,3\n1,2,3,4\n2,3,4,5\n9,4,5,6'
 seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
 seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
 seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'
