@@ -239,6 +239,7 @@ mod tests {
             path: "poses.csv".into(),
             format: PoseFormat::Csv,
             entries: names.iter().enumerate().map(entry).collect(),
+            conflicts: Vec::new(),
         }
     }
 

@@ -90,6 +90,7 @@ mod missing_poses;
 mod open;
 mod overlay;
 mod picture_motion;
+mod pose_conflicts;
 mod pose_reader;
 mod pose_readings;
 mod pose_validation;

@@ -4,6 +4,7 @@ use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by
 use super::error::SurveyError;
 use super::frame_times;
 use super::missing_poses::{self, MissingPoses, PoseGap};
+use super::pose_conflicts::{FrameConflict, frame_conflicts};
 use super::poses_section::PosesSection;
 use crate::frames::FrameFile;
 use std::path::Path;
@@ -32,6 +33,8 @@ pub(super) struct InterpretedPoses {
     pub format: PoseFormat,
     /// The frames that the file leaves out.
     pub gaps: Vec<PoseGap>,
+    /// Times that the file has twice with different poses.
+    pub conflicts: Vec<FrameConflict>,
 }
 
 impl InterpretedPoses {
@@ -80,6 +83,7 @@ impl InterpretedPoses {
             convention: self.convention,
             format: self.format,
             gaps: self.gaps.clone(),
+            conflicts: self.conflicts.clone(),
         }
     }
 }
@@ -144,7 +148,7 @@ impl<'a> PoseReader<'a> {
         } else {
             Associate::Order
         };
-        let mut gaps = Vec::new();
+        let (mut gaps, mut conflicts) = (Vec::new(), Vec::new());
         let given = match self.section.associate.unwrap_or(default) {
             Associate::Order => by_order(&file, frames, times_s)?,
             Associate::Name => {
@@ -159,10 +163,17 @@ impl<'a> PoseReader<'a> {
                     tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
                     interpolate: self.section.interpolate.unwrap_or(false),
                 };
-                match times_s {
-                    Some(times_s) => by_time(&file, frames, times_s, how)?,
-                    None => by_time(&file, frames, &frame_times::from_names(frames)?, how)?,
-                }
+                let of_names;
+                let times_s = match times_s {
+                    Some(times_s) => times_s,
+                    None => {
+                        of_names = frame_times::from_names(frames)?;
+                        &of_names
+                    }
+                };
+                let unit_m = self.section.unit_m.unwrap_or(1.0);
+                conflicts = frame_conflicts(&file, times_s, how, unit_m);
+                by_time(&file, frames, times_s, how)?
             }
         };
         for (pair, frame) in given.windows(2).zip(frames.iter().skip(1)) {
@@ -187,6 +198,7 @@ impl<'a> PoseReader<'a> {
             convention,
             format: file.format,
             gaps,
+            conflicts,
         };
         let read = match self.section.unit_m {
             Some(unit_m) => read.in_unit(unit_m),

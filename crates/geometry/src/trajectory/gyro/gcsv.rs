@@ -313,7 +313,9 @@ mod tests {
     #[test]
     fn a_colon_may_stand_for_the_comma_of_a_key() {
         let mixed = EXAMPLE.replace("version,1.3", "version:1.1");
-        let colons = mixed.replace("tscale,", "tscale: ").replace("note,", "note:");
+        let colons = mixed
+            .replace("tscale,", "tscale: ")
+            .replace("note,", "note:");
         for text in [mixed, colons] {
             let log = read(&text).unwrap();
             assert_eq!((log.samples.len(), log.samples[1].time_s), (2, 0.001));
