@@ -412,7 +412,8 @@ fn files_of_other_programs_are_read_as_they_are() {
         std::fs::write(&own_file, lines.join("\n")).unwrap();
     };
     twice(east + 0.002);
-    let said = succeed(&arguments);
+    let said = support::tunnelstitch(&arguments).stderr;
+    let said = String::from_utf8_lossy(&said);
     assert!(
         said.contains("lines 3 and 4 have two poses") && said.contains("2.00 mm"),
         "{said}"

@@ -38,8 +38,8 @@ pub(super) fn frame_conflicts(
     with_frame.collect()
 }
 
-/// True if the pose of a frame at `time_s` depends on the pose `entry`: it is the nearest, or one of
-/// the two between which is interpolated.
+/// True if the pose of a frame at `time_s` depends on the pose `entry`: it is the nearest, or one
+/// of the two between which is interpolated.
 fn depends_on(file: &PoseFile, entry: usize, time_s: f64, how: TimeAssociation) -> bool {
     let off = |entry: Option<usize>| {
         let time = entry.and_then(|entry| file.entries.get(entry)?.time_s);

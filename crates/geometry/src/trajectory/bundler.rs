@@ -28,7 +28,7 @@ const COLMAP_ENDING: &str = ".bundle.out";
 
 /// True for a text that begins as a bundle file does.
 pub(super) fn is_bundle(text: &str) -> bool {
-    text.trim_start().starts_with(TITLE)
+    text.starts_with(TITLE)
 }
 
 /// Parses a bundle file with the list of names beside it; pictures without a pose are left out.

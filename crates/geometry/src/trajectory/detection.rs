@@ -4,7 +4,7 @@ use super::error::PoseError;
 use super::format::PoseFormat;
 use super::pose_options::PoseFileOptions;
 use super::quaternion_order::QuaternionOrder;
-use super::{bundler, colmap, csv, euroc, kitti, metashape, pix4d, realitycapture, row, text, tum};
+use super::{bundler, colmap, csv, euroc, kitti, pix4d, realitycapture, row, text, tum};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::path::Path;
@@ -18,30 +18,13 @@ pub(super) fn detect_format(
     text: &str,
     options: &PoseFileOptions,
 ) -> Result<PoseFormat, PoseError> {
-    if text.trim_start().starts_with('{') {
-        return Ok(detect_json(text));
-    }
-    if let Some(list) = text.trim_start().strip_prefix('[')
-        && list.trim_start().starts_with(['{', ']'])
-    {
-        return Ok(PoseFormat::Opensfm);
-    }
-    if metashape::is_xml(text) {
-        return Ok(PoseFormat::Metashape);
-    }
-    if realitycapture::is_table(text) && options.columns.is_empty() {
-        return Ok(PoseFormat::Realitycapture);
-    }
-    if bundler::is_bundle(text) {
-        return Ok(PoseFormat::Bundler);
+    if let Some(format) = by_beginning(text, options) {
+        return Ok(format);
     }
     let Some((number, line)) = text::lines(text).next() else {
         // Only comments.
         return Err(PoseError::file(path, "holds no poses"));
     };
-    if pix4d::is_header(line) {
-        return Ok(PoseFormat::Pix4d);
-    }
     let order = options
         .quaternion
         .or_else(|| QuaternionOrder::of_comments(text));
@@ -69,15 +52,37 @@ pub(super) fn detect_format(
             path,
             number,
             format!(
-                "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line) nor a file \
-                 of COLMAP, nerfstudio, EuRoC, OpenSfM, Bundler, Meshroom, OpenMVG, Metashape, \
-                 RealityCapture or Pix4D; if it is one of them, name it with --pose-format \
-                 (poses.format in survey.toml)",
+                "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line) nor a \
+                 file of COLMAP, nerfstudio, EuRoC, OpenSfM, Bundler, Meshroom, OpenMVG, \
+                 Metashape, RealityCapture or Pix4D; if it is one of them, name it with \
+                 --pose-format (poses.format in survey.toml)",
                 tum::FORM,
                 kitti::FORM,
                 csv::FORM
             ),
         )),
+    }
+}
+
+/// Detects a format whose files begin in a way of their own.
+fn by_beginning(text: &str, options: &PoseFileOptions) -> Option<PoseFormat> {
+    let trimmed = text.trim_start();
+    let list = trimmed.strip_prefix('[').map(str::trim_start);
+    let first_line = || text::lines(text).next().map(|(_, line)| line);
+    if trimmed.starts_with('{') {
+        Some(detect_json(text))
+    } else if list.is_some_and(|list| list.starts_with(['{', ']'])) {
+        Some(PoseFormat::Opensfm)
+    } else if trimmed.starts_with('<') {
+        Some(PoseFormat::Metashape)
+    } else if bundler::is_bundle(trimmed) {
+        Some(PoseFormat::Bundler)
+    } else if options.columns.is_empty() && realitycapture::is_table(text) {
+        Some(PoseFormat::Realitycapture)
+    } else if first_line().is_some_and(pix4d::is_header) {
+        Some(PoseFormat::Pix4d)
+    } else {
+        None
     }
 }
 

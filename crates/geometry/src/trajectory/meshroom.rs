@@ -3,7 +3,7 @@
 //! OpenCV's axes, and its `center` in the world.
 //!
 //! Numbers are written as texts. Views of a rig have the pose of the rig and are refused. Source:
-//! AliceVision 3.3 (SfMData 1.2.11), `jsonIO.hpp`, `Pose3.hpp`.
+//! AliceVision (SfMData 1.2.11), `jsonIO.hpp`, `Pose3.hpp`.
 
 use super::error::PoseError;
 use super::pose::Pose;
@@ -137,7 +137,7 @@ mod tests {
             assert_eq!(file.entries[0].name.as_deref(), Some("/x/b.jpg"));
             let pose = Convention::of(file.format).to_world(&file.entries[0].pose);
             assert!((pose.t_wc - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-12);
-            // 4 m along the world's x is ahead, 0.5 m along its −z below, 2 m along −y to the right.
+            // 4 m along the world's x is ahead, 0.5 m along −z below, 2 m along −y to the right.
             let seen = pose.to_camera(&Vector3::new(5.0, 0.0, 2.5));
             assert!(
                 (seen - Vector3::new(2.0, 0.5, 4.0)).norm() < 1e-12,

@@ -1,5 +1,5 @@
-//! Metashape's cameras in XML: a `camera` with its `label` and a `transform` of sixteen numbers, row
-//! by row, **camera-to-chunk** in OpenCV's axes.
+//! Metashape's cameras in XML: a `camera` with its `label` and a `transform` of sixteen numbers,
+//! row by row, **camera-to-chunk** in OpenCV's axes.
 //!
 //! The `transform` of the camera's component, or else of the chunk (rotation, translation and
 //! scale), leads to the world, `x_world = s R x_chunk + t`: the local coordinate system in metres,
@@ -19,11 +19,6 @@ use nalgebra::Vector3;
 use roxmltree::Node;
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
-
-/// True for a text that may be XML.
-pub(super) fn is_xml(text: &str) -> bool {
-    text.trim_start().starts_with('<')
-}
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
     let fail = |what: String| PoseError::file(path, what);

@@ -1,6 +1,6 @@
 //! OpenMVG's `sfm_data.json`: `views` with the names of the pictures and `extrinsics` with the
-//! `rotation` of a camera, row by row, **world-to-camera** in OpenCV's axes, and its `center` in the
-//! world.
+//! `rotation` of a camera, row by row, **world-to-camera** in OpenCV's axes, and its `center` in
+//! the world.
 //!
 //! Source: OpenMVG 2.1 (sfm_data_version 0.3), `sfm_data_io_cereal.cpp`, `pose3_io.hpp`.
 

@@ -1,5 +1,5 @@
-//! OpenSfM's `reconstruction.json`: `shots` by their names, each with a `rotation` (rotation vector,
-//! radians) and a `translation`, **world-to-camera** in OpenCV's axes.
+//! OpenSfM's `reconstruction.json`: `shots` by their names, each with a `rotation` (rotation
+//! vector, radians) and a `translation`, **world-to-camera** in OpenCV's axes.
 //!
 //! Positions are metres where OpenSfM knew positions of GPS or of marks, else of an unknown scale.
 //! Source: OpenSfM's documentation, "Geometric Models", "Reconstruction File Format".

@@ -121,8 +121,8 @@ mod tests {
         read_poses(&path, None).map_err(|error| error.to_string())
     }
 
-    /// The world-to-camera matrix that the makers of the program publish, row by row: OpenCV's axes,
-    /// y, p and r in degrees.
+    /// The world-to-camera matrix that the makers of the program publish, row by row: OpenCV's
+    /// axes, y, p and r in degrees.
     fn published([y, p, r]: [f64; 3]) -> [[f64; 3]; 3] {
         let [(sz, cz), (sy, cy), (sx, cx)] = [y, p, r].map(|angle| angle.to_radians().sin_cos());
         [

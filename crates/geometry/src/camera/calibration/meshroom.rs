@@ -1,9 +1,11 @@
 //! The intrinsics of Meshroom's `cameras.sfm`, AliceVision's SfMData in JSON.
 //!
 //! Numbers are written as texts. Focal lengths are pixels before version 1.2.2, later millimetres
-//! of a sensor as wide as `sensorWidth`; the principal point is given from the middle of the picture
-//! since version 1.2.1. The centre of the first pixel is (0, 0). Source: AliceVision 3.3 (SfMData
-//! 1.2.11), `jsonIO.cpp`, `IntrinsicScaleOffset.cpp`, `Distortion*.cpp`.
+//! of a sensor as wide as `sensorWidth`; the principal point is given from the middle of the
+//! picture since version 1.2.1. The centre of the first pixel is (0, 0).
+//!
+//! Source: AliceVision (SfMData 1.2.11), `jsonIO.cpp`, `IntrinsicScaleOffset.cpp`,
+//! `Distortion*.cpp`.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;

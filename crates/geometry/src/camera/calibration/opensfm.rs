@@ -18,7 +18,7 @@ pub fn is_reconstruction(tree: &Value) -> bool {
     !parts.is_empty() && parts.iter().all(|part| part.get("cameras").is_some())
 }
 
-/// Reads `projection_type`, `width`, `height` and the parameters of a camera, whose name is its key.
+/// Reads `projection_type`, `width`, `height` and the parameters of a camera. Its name is its key.
 pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
     let parts = tree.as_array().map(Vec::as_slice).unwrap_or_default();
     let [part] = parts else {

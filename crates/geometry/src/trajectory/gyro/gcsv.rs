@@ -1,5 +1,5 @@
-//! Gyroflow's gyroscope log, `.gcsv`: a text of `key,value` lines (some loggers write a colon), then
-//! a table `t,gx,gy,gz[,ax,ay,az[,mx,my,mz]]`.
+//! Gyroflow's gyroscope log, `.gcsv`: a text of `key,value` lines (some loggers write a colon),
+//! then a table `t,gx,gy,gz[,ax,ay,az[,mx,my,mz]]`.
 //!
 //! `t · tscale` is seconds, `gx · gscale` rad/s, `ax · ascale` multiples of g; all in the sensor's
 //! own axes.
