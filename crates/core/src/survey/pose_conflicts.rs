@@ -3,9 +3,10 @@
 use super::associate::TimeAssociation;
 use super::error::SurveyError;
 use crate::frames::FrameFile;
+use std::collections::HashMap;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;
-use tunnelstitch_geometry::trajectory::{Jitter, PoseConflict, PoseFile};
+use tunnelstitch_geometry::trajectory::{Jitter, PoseConflict, PoseEntry, PoseFile};
 
 /// Largest contradiction at a frame, standard deviations of the prior: the pose that is kept may
 /// be as wrong as any other initial pose.
@@ -27,33 +28,48 @@ pub(super) fn frame_conflicts(
     how: TimeAssociation,
     unit_m: f64,
 ) -> Vec<FrameConflict> {
+    let mut first_frame: HashMap<usize, usize> = HashMap::new();
+    for (frame, time_s) in times_s.iter().enumerate() {
+        for entry in entries_of_frame(file, *time_s, how) {
+            first_frame.entry(entry).or_insert(frame);
+        }
+    }
     let conflicts = file.conflicts.iter();
     let with_frame = conflicts.map(|conflict| FrameConflict {
         conflict: *conflict,
-        frame: times_s
-            .iter()
-            .position(|time_s| depends_on(file, conflict.entry, *time_s, how)),
+        frame: first_frame.get(&conflict.entry).copied(),
         unit_m,
     });
     with_frame.collect()
 }
 
-/// True if the pose of a frame at `time_s` depends on the pose `entry`: it is the nearest, or one
-/// of the two between which is interpolated.
-fn depends_on(file: &PoseFile, entry: usize, time_s: f64, how: TimeAssociation) -> bool {
+/// The poses that the pose of a frame at `time_s` depends on: the nearest, or the two between which
+/// is interpolated.
+fn entries_of_frame(
+    file: &PoseFile,
+    time_s: f64,
+    how: TimeAssociation,
+) -> impl Iterator<Item = usize> {
+    let time = |entry: usize| file.entries.get(entry)?.time_s;
+    let is_before = |entry: &PoseEntry| entry.time_s.is_some_and(|other| other < time_s);
+    let next = file.entries.partition_point(is_before);
+    let last = next.checked_sub(1);
     let off = |entry: Option<usize>| {
-        let time = entry.and_then(|entry| file.entries.get(entry)?.time_s);
-        time.map(|time| time - time_s)
+        let time = entry.and_then(time);
+        time.map_or(f64::INFINITY, |time| (time - time_s).abs())
     };
-    let (before, own, after) = (
-        off(entry.checked_sub(1)).unwrap_or(f64::NEG_INFINITY),
-        off(Some(entry)).unwrap_or(f64::INFINITY),
-        off(Some(entry + 1)).unwrap_or(f64::INFINITY),
-    );
-    if how.interpolate {
-        return before < 0.0 && after > 0.0;
-    }
-    own.abs() <= how.tolerance_s && own.abs() <= before.abs() && own.abs() <= after.abs()
+    let nearest = if off(last) <= off(Some(next)) {
+        last
+    } else {
+        Some(next)
+    };
+    let is_between = how.interpolate && off(nearest) > 0.0;
+    let entries = if is_between {
+        [last, Some(next)]
+    } else {
+        [nearest, None]
+    };
+    entries.into_iter().flatten()
 }
 
 /// The warning about contradictions that the prior covers, if there are any.

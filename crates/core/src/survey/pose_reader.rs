@@ -7,10 +7,11 @@ use super::missing_poses::{self, MissingPoses, PoseGap};
 use super::pose_conflicts::{FrameConflict, frame_conflicts};
 use super::poses_section::PosesSection;
 use crate::frames::FrameFile;
+use std::borrow::Cow;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::{
-    Convention, Pose, PoseFormat, StampedPose, Trajectory, poses_of, read_camera_in_body,
+    Convention, Pose, PoseFile, PoseFormat, StampedPose, Trajectory, poses_of, read_camera_in_body,
     read_poses_with, read_tunnel_frame,
 };
 
@@ -159,21 +160,9 @@ impl<'a> PoseReader<'a> {
                 given
             }
             Associate::Time => {
-                let how = TimeAssociation {
-                    tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
-                    interpolate: self.section.interpolate.unwrap_or(false),
-                };
-                let of_names;
-                let times_s = match times_s {
-                    Some(times_s) => times_s,
-                    None => {
-                        of_names = frame_times::from_names(frames)?;
-                        &of_names
-                    }
-                };
-                let unit_m = self.section.unit_m.unwrap_or(1.0);
-                conflicts = frame_conflicts(&file, times_s, how, unit_m);
-                by_time(&file, frames, times_s, how)?
+                let (given, contradictions) = self.associate_by_time(&file)?;
+                conflicts = contradictions;
+                given
             }
         };
         for (pair, frame) in given.windows(2).zip(frames.iter().skip(1)) {
@@ -208,5 +197,23 @@ impl<'a> PoseReader<'a> {
             Some(true) => read.reversed(),
             _ => read,
         })
+    }
+
+    /// Associates the poses of a file by the times of the frames, and names its contradictions.
+    fn associate_by_time(
+        &self,
+        file: &PoseFile,
+    ) -> Result<(Trajectory, Vec<FrameConflict>), SurveyError> {
+        let how = TimeAssociation {
+            tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
+            interpolate: self.section.interpolate.unwrap_or(false),
+        };
+        let times_s = match self.times_s {
+            Some(times_s) => Cow::Borrowed(times_s),
+            None => Cow::Owned(frame_times::from_names(self.frames)?),
+        };
+        let given = by_time(file, self.frames, &times_s, how)?;
+        let unit_m = self.section.unit_m.unwrap_or(1.0);
+        Ok((given, frame_conflicts(file, &times_s, how, unit_m)))
     }
 }
