@@ -405,9 +405,11 @@ fn files_of_other_programs_are_read_as_they_are() {
     let words: Vec<&str> = lines[2].split(';').collect();
     let east: f64 = words[1].parse().unwrap();
     let twice = |east: f64| {
-        let second = [&words[..1], &[east.to_string().as_str()], &words[2..]].concat();
+        let east = east.to_string();
+        let second = [&words[..1], &[east.as_str()], &words[2..]]
+            .concat()
+            .join(";");
         let mut lines = lines.clone();
-        let second = second.join(";");
         lines.insert(3, &second);
         std::fs::write(&own_file, lines.join("\n")).unwrap();
     };

@@ -294,4 +294,19 @@ mod tests {
         assert_eq!(found.initial().unwrap().0, Path::new("right.tum"));
         assert!(found.truth().is_none());
     }
+
+    /// As many poses as frames are there only because one of two was left out.
+    #[test]
+    fn poses_that_contradict_each_other_are_associated_by_time() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["1.5.png", "2.5.png"] {
+            let picture = image::GrayImage::new(64, 48);
+            picture.save(dir.path().join(name)).unwrap();
+        }
+        let poses = "1.5 0 0 0 0 0 0 1\n2.5 0 0 0 0 0 0 1\n2.5 0 0.5 0 0 0 0 1\n";
+        std::fs::write(dir.path().join("poses.tum"), poses).unwrap();
+        let found = Discovery::of(dir.path()).unwrap();
+        let text = found.survey_toml(Some(3.0));
+        assert!(text.contains("\nassociate = \"time\""), "{text}");
+    }
 }

@@ -113,7 +113,7 @@ pub(super) fn check(
             count => format!(", and so do {} other times", count - 1),
         };
         format!(
-            "{}: {}{more}; the first pose of each is used",
+            "{}: {}{more}; the first pose of such a time is used",
             printed(path),
             first.description()
         )
@@ -181,7 +181,7 @@ mod tests {
         let warning = checked(&[0.0, 1.0, 2.0], false, 0.002).unwrap();
         assert!(
             warning.contains("lines 2 and 3 have two poses of 1 s, 4.00 mm")
-                && warning.contains("the first pose of each is used"),
+                && warning.contains("the first pose of such a time is used"),
             "{warning}"
         );
     }

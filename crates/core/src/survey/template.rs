@@ -105,7 +105,8 @@ impl Discovery {
             quoted(path),
             poses.entries.len()
         );
-        if poses.entries.len() != count && poses.has_times() && !poses.has_names() {
+        let is_by_time = poses.entries.len() != count || !poses.conflicts.is_empty();
+        if is_by_time && poses.has_times() && !poses.has_names() {
             *text += if self.video.is_some() {
                 "associate = \"time\"       # by the video's times, or by [frames] times = FILE\n\
                  interpolate = true\n"

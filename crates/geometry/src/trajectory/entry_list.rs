@@ -65,7 +65,8 @@ impl EntryList {
             if time_s == last_s {
                 if self.duplicates == DuplicateTimes::Refuse {
                     return Err(format!(
-                        "duplicate timestamp {time_s}: every pose needs a time of its own"
+                        "duplicate timestamp {time_s}: every pose needs a time of its own; or \
+                         associate them by time (--associate time)"
                     ));
                 }
                 let kept = self.parsed.entries.len() - 1;
