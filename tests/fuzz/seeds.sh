@@ -126,6 +126,56 @@ camera_matrix: {rows: 3, cols: 3, data: [415, 0, 318, 0, 417, 241, 0, 0, 1]}
 distortion_model: plumb_bob
 distortion_coefficients: {rows: 1, cols: 5, data: [-0.3, 0.1, 0.001, -0.002, 0]}
 END
+seed calibration gyroflow 0 <<'END'
+{"calib_dimension": {"w": 640, "h": 480}, "frame_readout_time": 15.5, "distortion_model": null, "digital_lens": null,
+ "input_horizontal_stretch": 1.0, "crop": null, "fisheye_params": {"camera_matrix": [[415, 0, 318], [0, 417, 241], [0, 0, 1]],
+ "distortion_coeffs": [-0.01, 0.005, -0.004, 0.0007]}}
+END
+seed calibration angles 0 <<<'{"camera_angle_x": 1.25, "w": 640, "h": 480, "frames": []}'
+opensfm='[{"cameras": {"v2": {"projection_type": "brown", "width": 640, "height": 480, "focal_x": 0.65, "focal_y": 0.65, "c_x": 0.01,
+ "c_y": 0, "k1": -0.1, "k2": 0.01, "k3": 0, "p1": 0.001, "p2": 0}}, "shots": {"a.png": {"rotation": [0.1, 0.2, 0.3],
+ "translation": [1, 2, 3], "camera": "v2"}}, "points": {}}]'
+seed poses opensfm 0 <<<"$opensfm"
+seed calibration opensfm 0 <<<"$opensfm"
+seed poses bundler 0 <<'END'
+# Bundle file v0.3
+2 1
+500 -0.1 0.01
+1 0 0
+0 1 0
+0 0 1
+-1 -2 -3
+0 0 0
+0 0 0
+0 0 0
+0 0 0
+0 0 0
+1.5 2.5 3.5
+255 0 0
+1 0 7 12.5 -3.25
+END
+meshroom='{"version": ["1", "2", "6"], "views": [{"viewId": "1", "poseId": "2", "intrinsicId": "3", "path": "a.png"}],
+ "intrinsics": [{"intrinsicId": "3", "width": "640", "height": "480", "sensorWidth": "36", "type": "radial3", "focalLength": "24",
+ "pixelRatio": "1", "principalPoint": ["-2", "1"], "distortionParams": ["-0.1", "0.01", "0"]}], "poses": [{"poseId": "2",
+ "pose": {"transform": {"rotation": ["0", "0", "1", "-1", "0", "0", "0", "-1", "0"], "center": ["1", "2", "3"]}, "locked": "0"}}]}'
+seed poses meshroom 0 <<<"$meshroom"
+seed calibration meshroom 0 <<<"$meshroom"
+openmvg='{"sfm_data_version": "0.3", "root_path": "", "views": [{"key": 0, "value": {"ptr_wrapper": {"data": {"local_path": "", "filename":
+ "a.png", "width": 640, "height": 480, "id_view": 0, "id_intrinsic": 4, "id_pose": 5}}}}], "intrinsics": [{"key": 4, "value":
+ {"polymorphic_name": "pinhole_radial_k3", "ptr_wrapper": {"data": {"width": 640, "height": 480, "focal_length": 415,
+ "principal_point": [318, 241], "disto_k3": [-0.1, 0.01, 0]}}}}], "extrinsics": [{"key": 5, "value": {"rotation":
+ [[0, -1, 0], [0, 0, -1], [1, 0, 0]], "center": [1, 2, 3]}}]}'
+seed poses openmvg 0 <<<"$openmvg"
+seed calibration openmvg 0 <<<"$openmvg"
+metashape='<document version="2.0.0"><chunk><sensors><sensor id="0" type="frame"><calibration type="frame" class="adjusted">
+<resolution width="640" height="480"/><f>415</f><cx>-2</cx><cy>1</cy><k1>-0.1</k1></calibration></sensor></sensors><cameras>
+<camera id="0" sensor_id="0" component_id="0" label="a"><transform>0 0 1 1 -1 0 0 2 0 -1 0 3 0 0 0 1</transform></camera></cameras>
+<transform><rotation>0 -1 0 1 0 0 0 0 1</rotation><translation>10 0 0</translation><scale>2</scale></transform></chunk></document>'
+seed poses metashape 0 <<<"$metashape"
+seed calibration metashape 5 <<<"$metashape"
+seed poses realitycapture 0 <<<$'#name,x,y,alt,heading,pitch,roll,f\na.png,1,2,3,10,90,-5,35'
+seed poses pix4d 0 <<<$'imageName X Y Z Omega Phi Kappa\na.png 1 2 3 90 10 -5'
+seed gyro colon 0 <<<$'GYROFLOW IMU LOG\nversion:1.1\norientation,YxZ\ntscale,0.1\ngscale,0.01\nt,gx,gy,gz\n0,1,2,3\n1,2,3,4\n2,3,4,5\n9,4,5,6'
 seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
 seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
 seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'

@@ -22,6 +22,7 @@ mod mutations;
 mod opencv;
 mod overlays;
 mod panorama;
+mod photogrammetry;
 mod picture_files;
 mod plan;
 mod points;

@@ -56,7 +56,32 @@ const SURVEY: &str = "[tunnel]\nshape = \"circle\"\nradius_m = 3.0\nignore = [{ 
                       0.02, 0.03]\n\
                       [options.stitch]\nmode = \"average\"\n";
 
-const SAMPLES: [(&str, &str); 17] = [
+const GYROFLOW: &str = r#"{"calib_dimension": {"w": 640, "h": 480}, "frame_readout_time": 15.5,
+ "fisheye_params": {"camera_matrix": [[415, 0, 318], [0, 417, 241], [0, 0, 1]],
+ "distortion_coeffs": [-0.01, 0.005, -0.004, 0.0007]}}"#;
+const OPENSFM: &str = r#"[{"cameras": {"v2": {"projection_type": "brown", "width": 640,
+ "height": 480, "focal_x": 0.65, "focal_y": 0.65, "c_x": 0.01, "k1": -0.1}},
+ "shots": {"a.png": {"rotation": [0.1, 0.2, 0.3], "translation": [1, 2, 3]}}}]"#;
+const MESHROOM: &str = r#"{"version": ["1", "2", "6"], "views": [{"poseId": "2", "path": "a.png"}],
+ "intrinsics": [{"intrinsicId": "3", "width": "640", "height": "480", "sensorWidth": "36",
+ "type": "radial3", "focalLength": "24", "pixelRatio": "1", "principalPoint": ["-2", "1"],
+ "distortionParams": ["-0.1", "0.01", "0"]}], "poses": [{"poseId": "2", "pose": {"transform":
+ {"rotation": ["0", "0", "1", "-1", "0", "0", "0", "-1", "0"], "center": ["1", "2", "3"]}}}]}"#;
+const OPENMVG: &str = r#"{"sfm_data_version": "0.3", "views": [{"key": 0, "value": {"ptr_wrapper":
+ {"data": {"filename": "a.png", "id_pose": 5}}}}], "intrinsics": [{"key": 4, "value":
+ {"ptr_wrapper": {"data": {"width": 640, "height": 480, "focal_length": 415,
+ "principal_point": [318, 241], "disto_k3": [-0.1, 0.01, 0]}}}}], "extrinsics": [{"key": 5,
+ "value": {"rotation": [[0, -1, 0], [0, 0, -1], [1, 0, 0]], "center": [1, 2, 3]}}]}"#;
+const METASHAPE: &str = r#"<document><chunk><sensors><sensor id="0"><calibration type="fisheye">
+<resolution width="640" height="480"/><f>415</f><cx>-2</cx><k1>-0.1</k1><p1>0.001</p1>
+</calibration></sensor></sensors><cameras><camera id="0" label="a"><transform>0 0 1 1 -1 0 0 2
+0 -1 0 3 0 0 0 1</transform></camera></cameras><transform><rotation>0 -1 0 1 0 0 0 0 1</rotation>
+<translation>10 0 0</translation><scale>2</scale></transform></chunk></document>"#;
+const REALITYCAPTURE: &str =
+    "#name,x,y,alt,heading,pitch,roll,f\na.png,1,2,3,10,90,-5,35\nb.png,1,2,4,10,90,-5,35\n";
+const PIX4D: &str = "imageName X Y Z Omega Phi Kappa\na.png 1 2 3 90 10 -5\nb.png 1 2 4 90 10 -5\n";
+
+const SAMPLES: [(&str, &str); 24] = [
     ("poses.tum", TUM),
     ("poses.txt", KITTI),
     ("poses.csv", CSV),
@@ -72,6 +97,13 @@ const SAMPLES: [(&str, &str); 17] = [
     ("calib_results.txt", OCAM),
     ("cameras.txt", THIN_PRISM),
     ("camera.json", OWN_OCAM),
+    ("lens.json", GYROFLOW),
+    ("reconstruction.json", OPENSFM),
+    ("cameras.sfm", MESHROOM),
+    ("sfm_data.json", OPENMVG),
+    ("cameras.xml", METASHAPE),
+    ("cameras.csv", REALITYCAPTURE),
+    ("external.txt", PIX4D),
     ("axis.json", AXIS),
     ("survey.toml", SURVEY),
 ];

@@ -400,15 +400,31 @@ fn files_of_other_programs_are_read_as_they_are() {
         message.contains("own.csv:1: no column `north`") && message.contains("`east`, `south`"),
         "{message}"
     );
-    let [header, first, second, ..] = content.lines().collect::<Vec<_>>()[..] else {
-        panic!("{content}");
+    // A second pose of a time is left out if the prior covers its difference, and refused if not.
+    let lines: Vec<&str> = content.lines().collect();
+    let words: Vec<&str> = lines[2].split(';').collect();
+    let east: f64 = words[1].parse().unwrap();
+    let twice = |east: f64| {
+        let east = east.to_string();
+        let second = [&words[..1], &[east.as_str()], &words[2..]]
+            .concat()
+            .join(";");
+        let mut lines = lines.clone();
+        lines.insert(3, &second);
+        std::fs::write(&own_file, lines.join("\n")).unwrap();
     };
-    let words: Vec<&str> = second.split(';').collect();
-    let moved = [&words[..1], &["0.5"], &words[2..]].concat().join(";");
-    std::fs::write(&own_file, format!("{header}\n{first}\n{second}\n{moved}\n")).unwrap();
+    twice(east + 0.002);
+    let said = support::tunnelstitch(&arguments).stderr;
+    let said = String::from_utf8_lossy(&said);
+    assert!(
+        said.contains("lines 3 and 4 have two poses") && said.contains("2.00 mm"),
+        "{said}"
+    );
+    assert_same(&tum::read(&out).unwrap(), &truth, 1e-12);
+    twice(east + 2.0);
     let message = fail(&arguments, 3);
     assert!(
-        message.contains("own.csv:4: ") && message.contains("lines 3 and 4"),
+        message.contains("own.csv: lines 3 and 4 have") && message.contains("frame 1 ("),
         "{message}"
     );
 }

@@ -78,6 +78,20 @@ enum FormatArgument {
     Nerfstudio,
     /// EuRoC's csv of a body's poses.
     Euroc,
+    /// OpenSfM's reconstruction.json.
+    Opensfm,
+    /// Bundler's bundle.out with its list of names.
+    Bundler,
+    /// Meshroom's cameras.sfm.
+    Meshroom,
+    /// OpenMVG's sfm_data.json.
+    Openmvg,
+    /// Metashape's cameras in XML.
+    Metashape,
+    /// RealityCapture's CSV of cameras.
+    Realitycapture,
+    /// Pix4D's calibrated external camera parameters.
+    Pix4d,
 }
 
 /// Names of orders of quaternions.
@@ -127,6 +141,13 @@ impl From<FormatArgument> for PoseFormat {
             FormatArgument::Colmap => Self::Colmap,
             FormatArgument::Nerfstudio => Self::Nerfstudio,
             FormatArgument::Euroc => Self::Euroc,
+            FormatArgument::Opensfm => Self::Opensfm,
+            FormatArgument::Bundler => Self::Bundler,
+            FormatArgument::Meshroom => Self::Meshroom,
+            FormatArgument::Openmvg => Self::Openmvg,
+            FormatArgument::Metashape => Self::Metashape,
+            FormatArgument::Realitycapture => Self::Realitycapture,
+            FormatArgument::Pix4d => Self::Pix4d,
         }
     }
 }

@@ -64,8 +64,9 @@ pub(super) fn by_order(
         .collect())
 }
 
-/// Associates poses by name: the name in the file of poses must equal the frame's path or its end.
-/// Poses of other files are ignored, and frames without a pose have none.
+/// Associates poses by name: the name in the file of poses must equal the frame's path or its end,
+/// with or without its extension. Poses of other files are ignored, and frames without a pose have
+/// none.
 ///
 /// # Errors
 /// A file without names; a frame with several poses.
@@ -93,15 +94,22 @@ pub(super) fn by_name(
             .push((path, entry));
     }
     let of_frame = |frame: &FrameFile| {
-        let same = named.get(&frame.name()).map_or(&[][..], Vec::as_slice);
+        let stem = frame.path.file_stem().unwrap_or_default().to_string_lossy();
+        let same = named
+            .get(&frame.name())
+            .or_else(|| named.get(stem.as_ref()))
+            .map_or(&[][..], Vec::as_slice);
         let entry = match same {
             [] => return Ok(None),
             [(_, only)] => Ok(*only),
             // Several folders contain files of that name: compare the path's components.
             several => {
-                let mut fitting = several
-                    .iter()
-                    .filter(|(path, _)| frame.path.ends_with(relative(path)));
+                let without_extension = frame.path.with_extension("");
+                let is_end = |path: &Path| {
+                    let path = relative(path);
+                    frame.path.ends_with(path) || without_extension.ends_with(path)
+                };
+                let mut fitting = several.iter().filter(|(path, _)| is_end(path));
                 match (fitting.next(), fitting.next()) {
                     (Some((_, only)), None) => Ok(*only),
                     _ => Err(fail(format!(
@@ -231,6 +239,7 @@ mod tests {
             path: "poses.csv".into(),
             format: PoseFormat::Csv,
             entries: names.iter().enumerate().map(entry).collect(),
+            conflicts: Vec::new(),
         }
     }
 
@@ -251,6 +260,18 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(message.contains("2 poses could be"), "{message}");
+    }
+
+    #[test]
+    fn names_may_lack_their_extension() {
+        let file = file(&["./left/b", "right/b", "c.1", "d.png", "d"]);
+        let frames = frames(&["s/right/b.png", "s/c.1.png", "s/d.png", "s/e.png"]);
+        let found = by_name(&file, &frames, None).unwrap();
+        let times_s: Vec<_> = found
+            .iter()
+            .map(|pose| Some(pose.as_ref()?.time_s))
+            .collect();
+        assert_eq!(times_s, [Some(11.0), Some(12.0), Some(13.0), None]);
     }
 
     #[test]

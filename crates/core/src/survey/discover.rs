@@ -199,7 +199,7 @@ impl Discovery {
 /// True if a file may be a calibration, by its name; `extension` is in lower case.
 fn is_calibration(file: &Path, extension: &str) -> bool {
     match extension {
-        "json" | "toml" | "yaml" | "yml" | "txt" => true,
+        "json" | "toml" | "yaml" | "yml" | "txt" | "sfm" | "xml" => true,
         "bin" => file.ends_with("cameras.bin"),
         _ => false,
     }
@@ -208,7 +208,7 @@ fn is_calibration(file: &Path, extension: &str) -> bool {
 /// True if a file may hold poses, by its name; `extension` is in lower case.
 fn is_pose_file(file: &Path, extension: &str) -> bool {
     match extension {
-        "txt" | "tum" | "csv" | "json" | "kitti" => true,
+        "txt" | "tum" | "csv" | "json" | "kitti" | "out" | "sfm" | "xml" => true,
         "bin" => file.ends_with("images.bin"),
         _ => false,
     }
@@ -293,5 +293,20 @@ mod tests {
         assert_eq!(found.calibrations[0].0, Path::new("b.txt"));
         assert_eq!(found.initial().unwrap().0, Path::new("right.tum"));
         assert!(found.truth().is_none());
+    }
+
+    /// As many poses as frames are there only because one of two was left out.
+    #[test]
+    fn poses_that_contradict_each_other_are_associated_by_time() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in ["1.5.png", "2.5.png"] {
+            let picture = image::GrayImage::new(64, 48);
+            picture.save(dir.path().join(name)).unwrap();
+        }
+        let poses = "1.5 0 0 0 0 0 0 1\n2.5 0 0 0 0 0 0 1\n2.5 0 0.5 0 0 0 0 1\n";
+        std::fs::write(dir.path().join("poses.tum"), poses).unwrap();
+        let found = Discovery::of(dir.path()).unwrap();
+        let text = found.survey_toml(Some(3.0));
+        assert!(text.contains("\nassociate = \"time\""), "{text}");
     }
 }

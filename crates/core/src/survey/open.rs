@@ -7,8 +7,10 @@ use super::file::{SURVEY_FILE, SurveyFile};
 use super::frame_list::FrameList;
 use super::masked_wall::MaskedWall;
 use super::missing_poses::{self, MissingPoses, PoseGap};
+use super::pose_conflicts;
 use super::pose_reader::PoseReader;
 use super::poses_section::PosesSection;
+use super::readout::readout_warning;
 use super::shape_file::ShapeFile;
 use super::{ignore, pose_validation};
 use crate::frames::{FrameSet, Mask, Video};
@@ -198,6 +200,7 @@ impl Survey {
             }
             None => None,
         };
+        warnings.extend(readout_warning(&survey.file.camera, &survey.folder));
         warnings.extend(orientation_warning);
         warnings.extend(
             video
@@ -252,6 +255,13 @@ impl Survey {
         let mut warnings =
             pose_validation::validate_poses(surface, &self.camera, &reading, &poses, path)?;
         warnings.extend(missing_poses::warning(path, &self.frames, &reading.gaps));
+        let conflicts = &reading.conflicts;
+        warnings.extend(pose_conflicts::check(
+            path,
+            &self.frames,
+            conflicts,
+            &self.prior,
+        )?);
         Ok(ReadPoses {
             trajectory,
             gaps: reading.gaps,

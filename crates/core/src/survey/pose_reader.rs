@@ -4,12 +4,14 @@ use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by
 use super::error::SurveyError;
 use super::frame_times;
 use super::missing_poses::{self, MissingPoses, PoseGap};
+use super::pose_conflicts::{FrameConflict, frame_conflicts};
 use super::poses_section::PosesSection;
 use crate::frames::FrameFile;
+use std::borrow::Cow;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::{
-    Convention, Pose, PoseFormat, StampedPose, Trajectory, poses_of, read_camera_in_body,
+    Convention, Pose, PoseFile, PoseFormat, StampedPose, Trajectory, poses_of, read_camera_in_body,
     read_poses_with, read_tunnel_frame,
 };
 
@@ -32,6 +34,8 @@ pub(super) struct InterpretedPoses {
     pub format: PoseFormat,
     /// The frames that the file leaves out.
     pub gaps: Vec<PoseGap>,
+    /// Times that the file has twice with different poses.
+    pub conflicts: Vec<FrameConflict>,
 }
 
 impl InterpretedPoses {
@@ -80,6 +84,7 @@ impl InterpretedPoses {
             convention: self.convention,
             format: self.format,
             gaps: self.gaps.clone(),
+            conflicts: self.conflicts.clone(),
         }
     }
 }
@@ -144,7 +149,7 @@ impl<'a> PoseReader<'a> {
         } else {
             Associate::Order
         };
-        let mut gaps = Vec::new();
+        let (mut gaps, mut conflicts) = (Vec::new(), Vec::new());
         let given = match self.section.associate.unwrap_or(default) {
             Associate::Order => by_order(&file, frames, times_s)?,
             Associate::Name => {
@@ -155,14 +160,9 @@ impl<'a> PoseReader<'a> {
                 given
             }
             Associate::Time => {
-                let how = TimeAssociation {
-                    tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
-                    interpolate: self.section.interpolate.unwrap_or(false),
-                };
-                match times_s {
-                    Some(times_s) => by_time(&file, frames, times_s, how)?,
-                    None => by_time(&file, frames, &frame_times::from_names(frames)?, how)?,
-                }
+                let (given, contradictions) = self.associate_by_time(&file)?;
+                conflicts = contradictions;
+                given
             }
         };
         for (pair, frame) in given.windows(2).zip(frames.iter().skip(1)) {
@@ -187,6 +187,7 @@ impl<'a> PoseReader<'a> {
             convention,
             format: file.format,
             gaps,
+            conflicts,
         };
         let read = match self.section.unit_m {
             Some(unit_m) => read.in_unit(unit_m),
@@ -196,5 +197,23 @@ impl<'a> PoseReader<'a> {
             Some(true) => read.reversed(),
             _ => read,
         })
+    }
+
+    /// Associates the poses of a file by the times of the frames, and names its contradictions.
+    fn associate_by_time(
+        &self,
+        file: &PoseFile,
+    ) -> Result<(Trajectory, Vec<FrameConflict>), SurveyError> {
+        let how = TimeAssociation {
+            tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
+            interpolate: self.section.interpolate.unwrap_or(false),
+        };
+        let times_s = match self.times_s {
+            Some(times_s) => Cow::Borrowed(times_s),
+            None => Cow::Owned(frame_times::from_names(self.frames)?),
+        };
+        let given = by_time(file, self.frames, &times_s, how)?;
+        let unit_m = self.section.unit_m.unwrap_or(1.0);
+        Ok((given, frame_conflicts(file, &times_s, how, unit_m)))
     }
 }

@@ -85,7 +85,7 @@ impl PosesSection {
         }
     }
 
-    /// The options for reading the files. A pose that is there twice is read once if poses are
+    /// The options for reading the files. A time that is there twice is read once if poses are
     /// associated with frames by time.
     pub(super) fn file_options(&self) -> PoseFileOptions {
         PoseFileOptions {

@@ -42,7 +42,8 @@ impl Discovery {
             None => writeln!(
                 text,
                 "# No calibration was found: OpenCV, ROS or Kalibr YAML, COLMAP's cameras.txt or \
-                 cameras.bin, nerfstudio's transforms.json, or our camera.json.\n\
+                 cameras.bin, nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, \
+                 Meshroom or Metashape, a lens profile of Gyroflow, or our camera.json.\n\
                  file = \"camera.json\""
             ),
         };
@@ -93,7 +94,8 @@ impl Discovery {
     fn write_initial_poses(&self, text: &mut String) {
         let (count, _) = self.frames();
         let Some((path, poses)) = self.initial() else {
-            *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC.\n\
+            *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC, OpenSfM, \
+                      Bundler, Meshroom, OpenMVG, Metashape, RealityCapture or Pix4D.\n\
                       initial = \"baseline.tum\"\n";
             return;
         };
@@ -103,7 +105,8 @@ impl Discovery {
             quoted(path),
             poses.entries.len()
         );
-        if poses.entries.len() != count && poses.has_times() && !poses.has_names() {
+        let is_by_time = poses.entries.len() != count || !poses.conflicts.is_empty();
+        if is_by_time && poses.has_times() && !poses.has_names() {
             *text += if self.video.is_some() {
                 "associate = \"time\"       # by the video's times, or by [frames] times = FILE\n\
                  interpolate = true\n"

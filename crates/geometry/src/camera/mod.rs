@@ -42,7 +42,7 @@ mod sweep;
 mod thin_prism;
 
 pub use brown_conrady::{BrownCoefficients, BrownConrady};
-pub use calibration::{CalibrationError, format_calibration, read_calibration};
+pub use calibration::{CalibrationError, format_calibration, read_calibration, stated_readout_ms};
 pub use colmap::{ColmapCamera, UnknownModelError};
 pub use double_sphere::DoubleSphere;
 pub use eucm::Eucm;

@@ -5,15 +5,19 @@
 //! | --- | --- |
 //! | opening and reading of regular files | [`regular`] |
 //! | numbers and names of binary files | [`binary`] |
+//! | numbers of JSON files | [`json`] |
 //! | largest sizes of text files | [`limits`] |
 //! | files that are locked or appended to, and targets that may be replaced | [`targets`] |
+//! | elements of XML files | [`xml`] |
 //! | names and texts without control characters | [`printed()`] |
 
 pub mod binary;
+pub mod json;
 pub mod limits;
 pub mod printed;
 pub mod regular;
 pub mod targets;
+pub mod xml;
 
 pub use binary::BinaryFile;
 pub use printed::{escape_controls, printed};

@@ -4,7 +4,9 @@ use super::error::PoseError;
 use super::format::PoseFormat;
 use super::pose_options::PoseFileOptions;
 use super::quaternion_order::QuaternionOrder;
-use super::{colmap, csv, euroc, kitti, row, text, tum};
+use super::{bundler, colmap, csv, euroc, kitti, pix4d, realitycapture, row, text, tum};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 use std::path::Path;
 
 /// Detects the format of a pose file from its content.
@@ -16,8 +18,8 @@ pub(super) fn detect_format(
     text: &str,
     options: &PoseFileOptions,
 ) -> Result<PoseFormat, PoseError> {
-    if text.trim_start().starts_with('{') {
-        return Ok(PoseFormat::Nerfstudio);
+    if let Some(format) = by_beginning(text, options) {
+        return Ok(format);
     }
     let Some((number, line)) = text::lines(text).next() else {
         // Only comments.
@@ -50,13 +52,53 @@ pub(super) fn detect_format(
             path,
             number,
             format!(
-                "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line), COLMAP, \
-                 nerfstudio nor EuRoC; \
-                 if it is one of them, name it with --pose-format (poses.format in survey.toml)",
+                "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line) nor a \
+                 file of COLMAP, nerfstudio, EuRoC, OpenSfM, Bundler, Meshroom, OpenMVG, \
+                 Metashape, RealityCapture or Pix4D; if it is one of them, name it with \
+                 --pose-format (poses.format in survey.toml)",
                 tum::FORM,
                 kitti::FORM,
                 csv::FORM
             ),
         )),
+    }
+}
+
+/// Detects a format whose files begin in a way of their own.
+fn by_beginning(text: &str, options: &PoseFileOptions) -> Option<PoseFormat> {
+    let trimmed = text.trim_start();
+    let list = trimmed.strip_prefix('[').map(str::trim_start);
+    let first_line = || text::lines(text).next().map(|(_, line)| line);
+    if trimmed.starts_with('{') {
+        Some(detect_json(text))
+    } else if list.is_some_and(|list| list.starts_with(['{', ']'])) {
+        Some(PoseFormat::Opensfm)
+    } else if trimmed.starts_with('<') {
+        Some(PoseFormat::Metashape)
+    } else if bundler::is_bundle(trimmed) {
+        Some(PoseFormat::Bundler)
+    } else if options.columns.is_empty() && realitycapture::is_table(text) {
+        Some(PoseFormat::Realitycapture)
+    } else if first_line().is_some_and(pix4d::is_header) {
+        Some(PoseFormat::Pix4d)
+    } else {
+        None
+    }
+}
+
+/// Keys at the top of JSON files, without their values.
+#[derive(Default, Deserialize)]
+struct TopKeys {
+    poses: Option<IgnoredAny>,
+    extrinsics: Option<IgnoredAny>,
+}
+
+/// Detects the format of a JSON object; what is none is left to the parser of nerfstudio's.
+fn detect_json(text: &str) -> PoseFormat {
+    let keys: TopKeys = serde_json::from_str(text).unwrap_or_default();
+    match (keys.poses, keys.extrinsics) {
+        (Some(_), None) => PoseFormat::Meshroom,
+        (None, Some(_)) => PoseFormat::Openmvg,
+        _ => PoseFormat::Nerfstudio,
     }
 }

@@ -1,5 +1,6 @@
 //! Poses of a file in the order of their times.
 
+use super::pose_conflict::PoseConflict;
 use super::pose_entry::PoseEntry;
 
 /// The handling of a time that two poses of a file share.
@@ -8,19 +9,32 @@ pub enum DuplicateTimes {
     /// They are an error: poses that are counted must all be there.
     #[default]
     Refuse,
-    /// The first of two poses is kept if they agree, and they are an error otherwise.
+    /// The first of two poses is kept; if they do not agree, [`PoseConflict`] tells of it.
     Merge,
 }
 
-/// Largest distance of two poses of one time that agree, metres.
-const MAX_DISTANCE_M: f64 = 1e-3;
-/// Largest angle between two poses of one time that agree, degrees.
-const MAX_ANGLE_DEG: f64 = 0.01;
+/// The poses of a file, and what contradicts them.
+#[derive(Default)]
+pub(super) struct ParsedPoses {
+    /// The poses; their times, if present, increase.
+    pub entries: Vec<PoseEntry>,
+    /// Poses that were left out because another has their time, and differs.
+    pub conflicts: Vec<PoseConflict>,
+}
+
+impl From<Vec<PoseEntry>> for ParsedPoses {
+    fn from(entries: Vec<PoseEntry>) -> Self {
+        Self {
+            entries,
+            conflicts: Vec::new(),
+        }
+    }
+}
 
 /// The poses read from a file so far; their times increase.
 pub(super) struct EntryList {
     duplicates: DuplicateTimes,
-    entries: Vec<PoseEntry>,
+    parsed: ParsedPoses,
     /// 1-based number of the last pose's line.
     last_line: usize,
 }
@@ -30,7 +44,7 @@ impl EntryList {
     pub fn new(duplicates: DuplicateTimes) -> Self {
         Self {
             duplicates,
-            entries: Vec::new(),
+            parsed: ParsedPoses::default(),
             last_line: 0,
         }
     }
@@ -38,9 +52,9 @@ impl EntryList {
     /// Adds the pose of a line.
     ///
     /// # Errors
-    /// A time before the last pose's; a pose of the same time that is refused.
+    /// A time before the last pose's; a pose of the same time, if it is refused.
     pub fn push(&mut self, line: usize, entry: PoseEntry) -> Result<(), String> {
-        if let Some(last) = self.entries.last()
+        if let Some(last) = self.parsed.entries.last()
             && let (Some(time_s), Some(last_s)) = (entry.time_s, last.time_s)
         {
             if time_s < last_s {
@@ -49,43 +63,28 @@ impl EntryList {
                 ));
             }
             if time_s == last_s {
-                return match self.duplicates {
-                    DuplicateTimes::Refuse => Err(format!(
-                        "duplicate timestamp {time_s}: every pose needs a time of its own"
-                    )),
-                    DuplicateTimes::Merge => {
-                        check_agreement([last, &entry], [self.last_line, line], time_s)
-                    }
-                };
+                if self.duplicates == DuplicateTimes::Refuse {
+                    return Err(format!(
+                        "duplicate timestamp {time_s}: every pose needs a time of its own; or \
+                         associate them by time (--associate time)"
+                    ));
+                }
+                let kept = self.parsed.entries.len() - 1;
+                let lines = [self.last_line, line];
+                let conflict = PoseConflict::between(kept, [last, &entry], lines, time_s);
+                self.parsed.conflicts.extend(conflict);
+                return Ok(());
             }
         }
-        self.entries.push(entry);
+        self.parsed.entries.push(entry);
         self.last_line = line;
         Ok(())
     }
 
     /// The poses.
-    pub fn into_entries(self) -> Vec<PoseEntry> {
-        self.entries
+    pub fn into_parsed(self) -> ParsedPoses {
+        self.parsed
     }
-}
-
-/// Checks that two poses of one time agree.
-fn check_agreement(
-    [a, b]: [&PoseEntry; 2],
-    [first, second]: [usize; 2],
-    time_s: f64,
-) -> Result<(), String> {
-    let distance_m = (a.pose.t_wc - b.pose.t_wc).norm();
-    let angle_deg = a.pose.r_wc.angle_to(&b.pose.r_wc).to_degrees();
-    if distance_m <= MAX_DISTANCE_M && angle_deg <= MAX_ANGLE_DEG {
-        return Ok(());
-    }
-    Err(format!(
-        "duplicate timestamp {time_s}: lines {first} and {second} have two poses of it, {:.2} mm \
-         and {angle_deg:.3}° from each other; remove the wrong line",
-        distance_m * 1e3
-    ))
 }
 
 #[cfg(test)]
@@ -109,18 +108,19 @@ mod tests {
             list.push(line, entry(5.0, x_m)).unwrap();
         }
         list.push(7, entry(6.0, 0.1)).unwrap();
-        let message = list.push(9, entry(6.0, 0.1012)).unwrap_err();
-        assert!(
-            message.contains("lines 7 and 9") && message.contains("1.20 mm"),
-            "{message}"
-        );
+        list.push(9, entry(6.0, 0.1012)).unwrap();
         assert!(
             list.push(10, entry(5.0, 0.0))
                 .unwrap_err()
                 .contains("sort the file")
         );
-        let entries = list.into_entries();
-        assert_eq!(entries, [entry(5.0, 0.0), entry(6.0, 0.1)]);
+        let parsed = list.into_parsed();
+        assert_eq!(parsed.entries, [entry(5.0, 0.0), entry(6.0, 0.1)]);
+        let [conflict] = parsed.conflicts[..] else {
+            panic!("{:?}", parsed.conflicts);
+        };
+        assert_eq!((conflict.entry, conflict.lines), (1, [7, 9]));
+        assert!((conflict.distance - 0.0012).abs() < 1e-12 && conflict.angle_deg == 0.0);
     }
 
     #[test]

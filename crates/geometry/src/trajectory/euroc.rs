@@ -3,7 +3,7 @@
 //! The first eight columns count; velocities and biases may follow. Read only. Source: Burri et
 //! al., "The EuRoC micro aerial vehicle datasets", 2016.
 
-use super::entry_list::DuplicateTimes;
+use super::entry_list::{DuplicateTimes, ParsedPoses};
 use super::error::PoseError;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
@@ -27,7 +27,7 @@ pub(super) fn parse(
     path: &Path,
     text: &str,
     duplicates: DuplicateTimes,
-) -> Result<Vec<PoseEntry>, PoseError> {
+) -> Result<ParsedPoses, PoseError> {
     text::stamped_lines(path, text, duplicates, parse_line)
 }
 

@@ -19,13 +19,29 @@ pub enum PoseFormat {
     Nerfstudio,
     /// EuRoC's csv of a body's poses; read only.
     Euroc,
+    /// OpenSfM's reconstruction.json; read only.
+    Opensfm,
+    /// Bundler's bundle.out with its list of names; read only.
+    Bundler,
+    /// Meshroom's cameras.sfm; read only.
+    Meshroom,
+    /// OpenMVG's sfm_data.json; read only.
+    Openmvg,
+    /// Metashape's cameras in XML; read only.
+    Metashape,
+    /// RealityCapture's CSV of cameras; read only.
+    Realitycapture,
+    /// Pix4D's calibrated external camera parameters; read only.
+    Pix4d,
 }
 
 impl PoseFormat {
     /// The direction of the format's poses.
     pub fn direction(self) -> Direction {
         match self {
-            Self::Colmap => Direction::WorldToCamera,
+            Self::Colmap | Self::Opensfm | Self::Bundler | Self::Meshroom | Self::Openmvg => {
+                Direction::WorldToCamera
+            }
             _ => Direction::CameraToWorld,
         }
     }
@@ -33,7 +49,9 @@ impl PoseFormat {
     /// The camera axes of the format.
     pub fn axes(self) -> CameraAxes {
         match self {
-            Self::Nerfstudio => CameraAxes::OpenGl,
+            Self::Nerfstudio | Self::Bundler | Self::Realitycapture | Self::Pix4d => {
+                CameraAxes::OpenGl
+            }
             _ => CameraAxes::OpenCv,
         }
     }

@@ -9,6 +9,13 @@
 //! | [`nerfstudio`] | camera-to-world, OpenGL's axes | | yes |
 //! | `colmap_binary` (read only) | world-to-camera, OpenCV's axes | | yes |
 //! | `euroc` (read only) | body-to-world | nanoseconds | |
+//! | `opensfm` (read only) | world-to-camera, OpenCV's axes | | yes |
+//! | `bundler` (read only) | world-to-camera, OpenGL's axes | | yes |
+//! | `meshroom` (read only) | world-to-camera, OpenCV's axes | | yes |
+//! | `openmvg` (read only) | world-to-camera, OpenCV's axes | | yes |
+//! | `metashape` (read only) | camera-to-world, OpenCV's axes | | yes |
+//! | `realitycapture` (read only) | camera-to-world, OpenGL's axes | | yes |
+//! | `pix4d` (read only) | camera-to-world, OpenGL's axes | | yes |
 //!
 //! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
 //! poses to the tunnel's frame.
@@ -27,6 +34,7 @@
 //! ```
 
 mod axes;
+mod bundler;
 pub mod colmap;
 mod colmap_binary;
 mod convention;
@@ -40,14 +48,21 @@ mod format;
 pub mod gyro;
 mod jitter;
 pub mod kitti;
+mod meshroom;
+mod metashape;
 mod mount;
 pub mod nerfstudio;
+mod openmvg;
+mod opensfm;
+mod pix4d;
 mod plan;
 mod pose;
+mod pose_conflict;
 mod pose_entry;
 mod pose_file;
 mod pose_options;
 mod quaternion_order;
+mod realitycapture;
 mod rigid;
 mod row;
 pub mod se3;
@@ -72,6 +87,7 @@ pub use jitter::{Jitter, JitterModel, MAX_SEARCH_VOLUME_DEG3};
 pub use mount::read_camera_in_body;
 pub use plan::{Mounting, PlanTable, Rate, Station, UniformMotion, spiral};
 pub use pose::Pose;
+pub use pose_conflict::PoseConflict;
 pub use pose_entry::PoseEntry;
 pub use pose_file::{PoseFile, read_poses, read_poses_with};
 pub use pose_options::PoseFileOptions;

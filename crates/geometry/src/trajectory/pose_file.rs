@@ -1,12 +1,17 @@
 //! Pose files in their own convention.
 
 use super::detection::detect_format;
+use super::entry_list::ParsedPoses;
 use super::error::PoseError;
 use super::format::PoseFormat;
+use super::pose_conflict::PoseConflict;
 use super::pose_entry::PoseEntry;
 use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
-use super::{colmap, colmap_binary, csv, euroc, kitti, nerfstudio, text, tum};
+use super::{
+    bundler, colmap, colmap_binary, csv, euroc, kitti, meshroom, metashape, nerfstudio, openmvg,
+    opensfm, pix4d, realitycapture, text, tum,
+};
 use std::path::{Path, PathBuf};
 
 /// A file of poses, in its own convention, with at least one pose. Times, if present, increase;
@@ -19,6 +24,9 @@ pub struct PoseFile {
     pub format: PoseFormat,
     /// The poses.
     pub entries: Vec<PoseEntry>,
+    /// Poses that were left out because another has their time, and differs
+    /// ([`DuplicateTimes::Merge`](super::DuplicateTimes::Merge)).
+    pub conflicts: Vec<PoseConflict>,
 }
 
 impl PoseFile {
@@ -67,19 +75,25 @@ pub fn read_poses_with(path: &Path, options: &PoseFileOptions) -> Result<PoseFil
     } else {
         path.to_owned()
     };
-    let (format, entries) = match options.format {
+    let (format, parsed) = match options.format {
         None | Some(PoseFormat::Colmap) if colmap_binary::is_binary(&path) => {
-            (PoseFormat::Colmap, colmap_binary::read(&path)?)
+            (PoseFormat::Colmap, colmap_binary::read(&path)?.into())
         }
         _ => read_text(&path, options)?,
     };
+    let ParsedPoses { entries, conflicts } = parsed;
     if entries.is_empty() {
         return Err(PoseError::file(&path, "holds no poses"));
+    }
+    if let Some(k) = entries.iter().position(|entry| !entry.pose.is_finite()) {
+        let what = format!("pose {}: its numbers are too large", k + 1);
+        return Err(PoseError::file(&path, what));
     }
     Ok(PoseFile {
         path,
         format,
         entries,
+        conflicts,
     })
 }
 
@@ -98,20 +112,27 @@ fn colmap_images(folder: &Path) -> PathBuf {
 fn read_text(
     path: &Path,
     options: &PoseFileOptions,
-) -> Result<(PoseFormat, Vec<PoseEntry>), PoseError> {
+) -> Result<(PoseFormat, ParsedPoses), PoseError> {
     let text = text::read(path)?;
     let format = match options.format {
         Some(format) => format,
         None => detect_format(path, &text, options)?,
     };
     let duplicates = options.duplicate_times;
-    let entries = match format {
-        PoseFormat::Tum => tum::parse(path, &text, options.quaternion, duplicates),
-        PoseFormat::Kitti => kitti::parse(path, &text),
-        PoseFormat::Csv => csv::parse(path, &text, &options.columns, duplicates),
-        PoseFormat::Colmap => colmap::parse(path, &text),
-        PoseFormat::Nerfstudio => nerfstudio::parse(path, &text),
-        PoseFormat::Euroc => euroc::parse(path, &text, duplicates),
-    }?;
-    Ok((format, entries))
+    let parsed = match format {
+        PoseFormat::Tum => tum::parse(path, &text, options.quaternion, duplicates)?,
+        PoseFormat::Kitti => kitti::parse(path, &text)?.into(),
+        PoseFormat::Csv => csv::parse(path, &text, &options.columns, duplicates)?,
+        PoseFormat::Colmap => colmap::parse(path, &text)?.into(),
+        PoseFormat::Nerfstudio => nerfstudio::parse(path, &text)?.into(),
+        PoseFormat::Euroc => euroc::parse(path, &text, duplicates)?,
+        PoseFormat::Opensfm => opensfm::parse(path, &text)?.into(),
+        PoseFormat::Bundler => bundler::parse(path, &text)?.into(),
+        PoseFormat::Meshroom => meshroom::parse(path, &text)?.into(),
+        PoseFormat::Openmvg => openmvg::parse(path, &text)?.into(),
+        PoseFormat::Metashape => metashape::parse(path, &text)?.into(),
+        PoseFormat::Realitycapture => realitycapture::parse(path, &text)?.into(),
+        PoseFormat::Pix4d => pix4d::parse(path, &text)?.into(),
+    };
+    Ok((format, parsed))
 }

@@ -1,7 +1,7 @@
 //! Elements of all text formats: lines, numbers, times, quaternions and names.
 
 use super::encoding::decode;
-use super::entry_list::{DuplicateTimes, EntryList};
+use super::entry_list::{DuplicateTimes, EntryList, ParsedPoses};
 use super::error::PoseError;
 use super::pose_entry::PoseEntry;
 use super::times;
@@ -41,14 +41,14 @@ pub(super) fn stamped_lines(
     text: &str,
     duplicates: DuplicateTimes,
     parse_line: impl Fn(&str) -> Result<PoseEntry, String>,
-) -> Result<Vec<PoseEntry>, PoseError> {
+) -> Result<ParsedPoses, PoseError> {
     let mut entries = EntryList::new(duplicates);
     for (number, line) in lines(text) {
         parse_line(line)
             .and_then(|entry| entries.push(number, entry))
             .map_err(|what| PoseError::line(path, number, what))?;
     }
-    Ok(entries.into_entries())
+    Ok(entries.into_parsed())
 }
 
 /// Parses a finite number; `form` describes the line for the error message.

@@ -6,7 +6,7 @@
 //! The program's own format. It is written with eight columns, single spaces and no trailing space,
 //! as `evo` requires.
 
-use super::entry_list::DuplicateTimes;
+use super::entry_list::{DuplicateTimes, ParsedPoses};
 use super::error::PoseError;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
@@ -27,7 +27,8 @@ pub(super) const FORM: &str = "time tx ty tz qx qy qz qw";
 /// quaternion of length zero (or farther than 1 % from unit length); times that do not increase; no
 /// pose at all.
 pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
-    let entries = parse(path, &text::read(path)?, None, DuplicateTimes::Refuse)?;
+    let parsed = parse(path, &text::read(path)?, None, DuplicateTimes::Refuse)?;
+    let entries = parsed.entries;
     if entries.is_empty() {
         return Err(PoseError::file(path, "holds no poses"));
     }
@@ -45,7 +46,7 @@ pub(super) fn parse(
     text: &str,
     order: Option<QuaternionOrder>,
     duplicates: DuplicateTimes,
-) -> Result<Vec<PoseEntry>, PoseError> {
+) -> Result<ParsedPoses, PoseError> {
     let order = order
         .or_else(|| QuaternionOrder::of_comments(text))
         .unwrap_or_default();

@@ -3,7 +3,7 @@
 use super::super::file;
 use tunnelstitch::camera::{ColmapCamera, format_calibration, read_calibration};
 
-const ENDINGS: [&str; 5] = ["json", "toml", "yaml", "txt", "bin"];
+const ENDINGS: [&str; 6] = ["json", "toml", "yaml", "txt", "bin", "xml"];
 
 /// Reads the input.
 pub fn run(data: &[u8]) {

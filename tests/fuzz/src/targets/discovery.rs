@@ -3,7 +3,7 @@
 use super::super::file;
 use tunnelstitch::survey::Discovery;
 
-const NAMES: [&str; 8] = [
+const NAMES: [&str; 11] = [
     "a.json",
     "a.toml",
     "a.yaml",
@@ -12,6 +12,9 @@ const NAMES: [&str; 8] = [
     "a.png",
     "cameras.bin",
     "images.bin",
+    "a.xml",
+    "a.sfm",
+    "a.out",
 ];
 
 /// Reads the input.

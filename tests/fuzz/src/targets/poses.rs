@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use tunnelstitch::survey::{Associate, Survey};
 use tunnelstitch::trajectory::{Pose, PoseFormat, read_poses};
 
-const FORMATS: [Option<PoseFormat>; 7] = [
+const FORMATS: [Option<PoseFormat>; 14] = [
     None,
     Some(PoseFormat::Tum),
     Some(PoseFormat::Kitti),
@@ -14,6 +14,13 @@ const FORMATS: [Option<PoseFormat>; 7] = [
     Some(PoseFormat::Colmap),
     Some(PoseFormat::Nerfstudio),
     Some(PoseFormat::Euroc),
+    Some(PoseFormat::Opensfm),
+    Some(PoseFormat::Bundler),
+    Some(PoseFormat::Meshroom),
+    Some(PoseFormat::Openmvg),
+    Some(PoseFormat::Metashape),
+    Some(PoseFormat::Realitycapture),
+    Some(PoseFormat::Pix4d),
 ];
 const TIES: [Option<Associate>; 4] = [
     None,

@@ -16,6 +16,7 @@ fn verdict(poses: &[Pose], given: Convention) -> Result<Vec<String>, String> {
         convention: given,
         format: PoseFormat::Tum,
         gaps: Vec::new(),
+        conflicts: Vec::new(),
     };
     let surface = Circle::new(RADIUS_M).unwrap();
     let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());

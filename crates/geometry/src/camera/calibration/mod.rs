@@ -1,6 +1,8 @@
 //! Calibration files: the program's own format (JSON or TOML), OpenCV's YAML, ROS's camera_info,
 //! Kalibr's camchain, the YAML of camodocal and VINS-Fusion, COLMAP's cameras.txt and cameras.bin,
-//! nerfstudio's transforms.json, Basalt's JSON and OCamCalib's calib_results.txt.
+//! nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, Meshroom
+//! and Metashape, Basalt's JSON, Gyroflow's lens profiles and OCamCalib's
+//! calib_results.txt.
 //!
 //! | file | recognised by | lens | centre of the first pixel |
 //! | --- | --- | --- | --- |
@@ -11,8 +13,13 @@
 //! | camodocal | `.yaml` with `model_type` | `PINHOLE`, `MEI`, `KANNALA_BRANDT` | (0, 0) |
 //! | COLMAP | `.txt`, `.bin` | PINHOLE … FULL_OPENCV, the fisheyes, THIN_PRISM_FISHEYE, FOV, EUCM | (½, ½) |
 //! | OCamCalib | `.txt` with five lines of numbers | polynomial | (0, 0) |
+//! | OpenSfM | `.json` that is a list with `cameras` | `perspective`, `simple_radial`, `radial`, `brown`, `fisheye`, `fisheye_opencv` | normalised |
+//! | OpenMVG | `.json` with `sfm_data_version` | `pinhole`, `pinhole_radial_k1`, `pinhole_radial_k3`, `pinhole_brown_t2`, `fisheye` | (0, 0) |
+//! | Meshroom | `.json`, `.sfm` with `version` and `intrinsics` | pinhole with `radialk1`, `radialk3`, `brown`, `fisheye`, `none` | (0, 0) |
+//! | Metashape | `.xml` with a `chunk` | `frame`, `fisheye` | (½, ½) |
 //! | Basalt | `.json` with `value0` | `pinhole`, `ds`, `eucm`, `ucm`, `kb4`, `fov` | (0, 0) |
-//! | nerfstudio | `.json` with `fl_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
+//! | Gyroflow | `.json` with `fisheye_params` and `calib_dimension` | `opencv_fisheye`, `opencv_standard` | (0, 0) |
+//! | nerfstudio, instant-ngp | `.json` with `fl_x`, `camera_angle_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
 
 mod basalt;
 mod camodocal;
@@ -22,12 +29,17 @@ mod colmap_binary;
 #[cfg(test)]
 mod colmap_binary_tests;
 mod error;
+mod gyroflow;
 mod kalibr;
 mod lens_keys;
+mod meshroom;
+mod metashape;
 mod native;
 mod nerfstudio;
 mod ocamcalib;
 mod opencv;
+mod openmvg;
+mod opensfm;
 mod read;
 mod selection;
 #[cfg(test)]
@@ -39,4 +51,4 @@ mod wide_angle_tests;
 
 pub use error::CalibrationError;
 pub use native::format_calibration;
-pub use read::read_calibration;
+pub use read::{read_calibration, stated_readout_ms};

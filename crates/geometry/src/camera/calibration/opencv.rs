@@ -36,24 +36,7 @@ const HEIGHT: [&str; 3] = ["image_height", "height", "image_Height"];
 pub fn read(tree: &Value) -> Result<Camera, ParseError> {
     let matrix = entry(tree, &MATRIX)
         .ok_or_else(|| unknown_calibration(" (no `camera_matrix`, `cam0` or `model_type`)"))?;
-    let k = numbers(matrix, "camera_matrix")?;
-    let [fx, skew, cx, _, fy, cy, ..] = k[..] else {
-        return Err(ParseError::new(format!(
-            "`camera_matrix` has {} numbers; it must have 3 × 3",
-            k.len()
-        )));
-    };
-    if k.len() != 9 {
-        return Err(ParseError::new(format!(
-            "`camera_matrix` has {} numbers; it must have 3 × 3",
-            k.len()
-        )));
-    }
-    if skew != 0.0 {
-        return Err(ParseError::new(format!(
-            "`camera_matrix` has a skew of {skew}; cameras with skew are not supported"
-        )));
-    }
+    let [focal, centre] = focal_and_centre(matrix)?;
     let size = |names: &[&str]| {
         pixels(tree, names).map_err(|error| {
             let what = error.what + "; add the frames' size as image_width and image_height";
@@ -79,5 +62,22 @@ pub fn read(tree: &Value) -> Result<Camera, ParseError> {
             )));
         }
     };
-    Ok(Camera::at_rest([width, height], [fx, fy], [cx, cy], lens))
+    Ok(Camera::at_rest([width, height], focal, centre, lens))
+}
+
+/// The focal lengths and the principal point of a camera matrix, pixels.
+pub fn focal_and_centre(matrix: &Value) -> Result<[[f64; 2]; 2], ParseError> {
+    let k = numbers(matrix, "camera_matrix")?;
+    let [fx, skew, cx, _, fy, cy, _, _, _] = k[..] else {
+        return Err(ParseError::new(format!(
+            "`camera_matrix` has {} numbers; it must have 3 × 3",
+            k.len()
+        )));
+    };
+    if skew != 0.0 {
+        return Err(ParseError::new(format!(
+            "`camera_matrix` has a skew of {skew}; cameras with skew are not supported"
+        )));
+    }
+    Ok([[fx, fy], [cx, cy]])
 }

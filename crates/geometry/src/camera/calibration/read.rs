@@ -3,8 +3,8 @@
 use super::error::{CalibrationError, ParseError};
 use super::unknown::unknown_calibration;
 use super::{
-    basalt, camodocal, colmap, colmap_binary, kalibr, native, nerfstudio, ocamcalib, opencv,
-    value_tree,
+    basalt, camodocal, colmap, colmap_binary, gyroflow, kalibr, meshroom, metashape, native,
+    nerfstudio, ocamcalib, opencv, openmvg, opensfm, value_tree,
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
@@ -53,6 +53,18 @@ pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, Calib
         .map_err(content)
 }
 
+/// The readout time of a rolling shutter that a calibration file states beside the camera
+/// (Gyroflow's lens profiles do), milliseconds: from the first row to the last, negative in the
+/// other direction. `None` if there is none, or no such file.
+pub fn stated_readout_ms(path: &Path) -> Option<f64> {
+    let bytes = read_regular(path, MAX_CALIBRATION_BYTES).ok()?;
+    let text = String::from_utf8(bytes).ok()?;
+    let tree = value_tree::parse_json(text.trim_start_matches('\u{feff}')).ok()?;
+    gyroflow::is_profile(&tree)
+        .then(|| gyroflow::readout_ms(&tree))
+        .flatten()
+}
+
 fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, ParseError> {
     match extension {
         "yaml" | "yml" => {
@@ -68,13 +80,23 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
         "txt" if ocamcalib::is_ocamcalib(text) => ocamcalib::read(text),
         "txt" if colmap::has_no_model(text) => Err(unknown_calibration("")),
         "txt" => colmap::read(text, name),
+        "out" => Err(ParseError::new(
+            "a bundle file has no size of its pictures; write a camera.json with it: the model \
+             brown-conrady, fx and fy the first number of a camera, k1 and k2 the other two, cx = \
+             (width − 1) / 2, cy = (height − 1) / 2",
+        )),
         "toml" => native::read_toml(text),
+        "xml" if !text.contains("<opencv_storage") => metashape::read(text, name),
         "xml" => Err(ParseError::new(
             "OpenCV's XML is not supported; save the calibration as YAML (a name that ends in \
              .yml)",
         )),
         _ => match value_tree::parse_json(text) {
             Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
+            Ok(tree) if gyroflow::is_profile(&tree) => gyroflow::read(&tree),
+            Ok(tree) if opensfm::is_reconstruction(&tree) => opensfm::read(&tree, name),
+            Ok(tree) if openmvg::is_sfm_data(&tree) => openmvg::read(&tree, name),
+            Ok(tree) if meshroom::is_sfm(&tree) => meshroom::read(&tree, name),
             Ok(tree) if basalt::is_basalt(&tree) => basalt::read(&tree, name),
             Ok(tree) if !native::is_native(&tree) => Err(unknown_calibration("")),
             _ => native::read_json(text),

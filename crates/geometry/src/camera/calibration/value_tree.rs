@@ -37,6 +37,12 @@ pub fn entry<'a>(tree: &'a Value, names: &[&str]) -> Option<&'a Value> {
     names.iter().find_map(|name| tree.get(name))
 }
 
+/// The entry of that name.
+pub fn needed<'a>(tree: &'a Value, name: &str) -> Result<&'a Value, ParseError> {
+    let missing = || ParseError::new(format!("the entry `{name}` is missing"));
+    tree.get(name).ok_or_else(missing)
+}
+
 /// The first entry that exists under one of the names, as a number.
 pub fn number(tree: &Value, names: &[&str]) -> Result<f64, ParseError> {
     let value = entry(tree, names)

@@ -5,7 +5,7 @@ use super::columns::{Columns, FORM, TimeColumn};
 use super::header::Header;
 use super::pose_column::ColumnMap;
 use super::table::split;
-use crate::trajectory::entry_list::{DuplicateTimes, EntryList};
+use crate::trajectory::entry_list::{DuplicateTimes, EntryList, ParsedPoses};
 use crate::trajectory::error::PoseError;
 use crate::trajectory::pose::Pose;
 use crate::trajectory::pose_entry::PoseEntry;
@@ -20,9 +20,9 @@ pub(crate) fn parse(
     text: &str,
     map: &ColumnMap,
     duplicates: DuplicateTimes,
-) -> Result<Vec<PoseEntry>, PoseError> {
+) -> Result<ParsedPoses, PoseError> {
     let Some(header) = Header::find(text, map).or_else(|| Header::first_line(text)) else {
-        return Ok(Vec::new());
+        return Ok(ParsedPoses::default());
     };
     let fail = |number: usize| move |what: String| PoseError::line(path, number, what);
     let titles = split(header.line, header.separator).map_err(fail(header.number))?;
@@ -44,7 +44,7 @@ pub(crate) fn parse(
             })
             .map_err(fail(number))?;
     }
-    Ok(entries.into_entries())
+    Ok(entries.into_parsed())
 }
 
 /// A reader of the rows of a table.
@@ -116,7 +116,8 @@ mod tests {
     use crate::trajectory::stamped_pose::StampedPose;
 
     fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
-        super::parse(path, text, &ColumnMap::new(), DuplicateTimes::Refuse)
+        let parsed = super::parse(path, text, &ColumnMap::new(), DuplicateTimes::Refuse)?;
+        Ok(parsed.entries)
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! Gyroflow's gyroscope log, `.gcsv`: a text of `key,value` lines, then a table
-//! `t,gx,gy,gz[,ax,ay,az[,mx,my,mz]]`.
+//! Gyroflow's gyroscope log, `.gcsv`: a text of `key,value` lines (some loggers write a colon),
+//! then a table `t,gx,gy,gz[,ax,ay,az[,mx,my,mz]]`.
 //!
 //! `t · tscale` is seconds, `gx · gscale` rad/s, `ax · ascale` multiples of g; all in the sensor's
 //! own axes.
@@ -150,7 +150,7 @@ impl GyroLog {
                     "ends within its header: there is no line `t,gx,gy,gz`",
                 ));
             };
-            let Some((key, value)) = line.split_once(',') else {
+            let Some((key, value)) = line.split_once([',', ':']) else {
                 let what = format!("`{line}` where the header has lines `key,value`");
                 return Err(PoseError::line(path, number, what));
             };
@@ -307,6 +307,19 @@ mod tests {
         assert_eq!(sample.acceleration_g.unwrap().x, -1179.0 * 0.00048828125);
         let rates = log.rates(&log.orientation.unwrap().to_camera());
         assert_eq!(rates.rates()[1].y, -100.0 * 0.00122173047);
+    }
+
+    /// As loggers of action cameras and small computers write it.
+    #[test]
+    fn a_colon_may_stand_for_the_comma_of_a_key() {
+        let mixed = EXAMPLE.replace("version,1.3", "version:1.1");
+        let colons = mixed
+            .replace("tscale,", "tscale: ")
+            .replace("note,", "note:");
+        for text in [mixed, colons] {
+            let log = read(&text).unwrap();
+            assert_eq!((log.samples.len(), log.samples[1].time_s), (2, 0.001));
+        }
     }
 
     #[test]
