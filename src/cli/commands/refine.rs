@@ -214,7 +214,8 @@ pub fn run(
         outputs.commit()?;
         Ok((refined, json))
     })?;
-    if 2 * refined.report.frames_on_prior > survey.frames.len() {
+    // Frames that fit at two places are read rightly.
+    if 2 * count_flagged(&refined.report, FrameFlag::Prior) > survey.frames.len() {
         warn_of_reading(&survey, terminal)?;
     }
     if arguments.json {
@@ -273,6 +274,11 @@ impl RefineArguments {
             }
         }
     }
+}
+
+fn count_flagged(report: &RefineReport, flag: FrameFlag) -> usize {
+    let frames = report.frames.iter();
+    frames.filter(|frame| frame.flag == flag).count()
 }
 
 /// Searches for a reading of poses and pictures that the frames agree with, and warns if there is
@@ -471,14 +477,22 @@ pub fn print_summary(refined: &Refined, terminal: &Terminal) {
         ));
         let contradicts = report.prior_test.contradicting_scale().is_some();
         if report.frames_on_prior == report.frames.len() && !contradicts {
-            terminal.warn(
-                "  no frame is photometric; possible causes: too few overlapping frames, a wall \
-                 without texture, poses in another convention (--pose-convention, --camera-axes, \
-                 --tunnel-frame), a wrong radius_m, calibration or [prior], or a mask or \
-                 tunnel.ignore that leaves nothing to compare",
-            );
+            terminal.warn(explain_failure(report));
         }
         warn_of_rejected_frames(report, terminal);
+    }
+}
+
+/// What may have kept all frames from being photometric.
+fn explain_failure(report: &RefineReport) -> &'static str {
+    if 2 * count_flagged(report, FrameFlag::Ambiguous) > report.frames.len() {
+        "  no frame is photometric: the wall repeats itself, and the initial poses are too uncertain \
+         to tell its repetitions apart; more exact ones, with a smaller σ under [prior], do"
+    } else {
+        "  no frame is photometric; possible causes: too few overlapping frames, a wall without \
+         texture, poses in another convention (--pose-convention, --camera-axes, --tunnel-frame), \
+         a wrong radius_m, calibration or [prior], or a mask or tunnel.ignore that leaves nothing \
+         to compare"
     }
 }
 
