@@ -8,7 +8,7 @@ use crate::refine::{
     FrameReport, LengthScale, LevelReport, MaskedReport, PointsReport, PriorTest, ShapeReport,
     StageTime, SurveyVerdict, read_covariances,
 };
-use crate::survey::{MASKED_FILE, MaskedWall, OverlayReport, Survey};
+use crate::survey::{MASKED_FILE, MaskedWall, OverlayReport, SkippedFrame, Survey};
 use crate::trajectory::{Pose, poses_of};
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
@@ -49,6 +49,9 @@ pub struct Refinement {
     /// The wall that was left out; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked: Option<MaskedReport>,
+    /// Frames that were left out because they cannot be read.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub skipped_frames: Vec<SkippedFrame>,
     /// Pixels that do not move with the wall; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub overlay: Option<OverlayReport>,

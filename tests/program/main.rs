@@ -35,6 +35,7 @@ mod rolling;
 mod shapes;
 mod simulate;
 mod simulated_walls;
+mod skipped_frames;
 mod super_resolve;
 mod support;
 mod untrusted_files;

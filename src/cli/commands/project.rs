@@ -67,7 +67,11 @@ pub fn run(
         None => described_camera(arguments)?,
     };
     let file = FrameFile::picture(0, arguments.image.clone());
-    let photo = Picture::from_decoded(load_colour(&file, camera.width, camera.height)?);
+    let decoded = load_colour(&file, camera.width, camera.height).map_err(|error| {
+        let image = printed(&arguments.image);
+        Failure::input(format!("{image}: {}", error.reason()))
+    })?;
+    let photo = Picture::from_decoded(decoded);
     let result = cylinder::project(&photo, &camera, arguments.interpolation.into());
     let mut outputs = OutputSet::default();
     add_picture(&mut outputs, &arguments.out, &result.image, format)?;

@@ -7,9 +7,10 @@ use super::file::{SURVEY_FILE, SurveyFile};
 use super::frame_list::FrameList;
 use super::masked_wall::MaskedWall;
 use super::missing_poses::{self, MissingPoses, PoseGap};
-use super::pose_reader::PoseReader;
+use super::pose_reader::{FramesToPose, PoseReader};
 use super::poses_section::PosesSection;
 use super::shape_file::ShapeFile;
+use super::skipped_frames::{self, SkippedFrame};
 use super::{ignore, pose_validation};
 use crate::frames::{FrameSet, Mask, Video};
 use std::path::{Path, PathBuf};
@@ -49,6 +50,8 @@ pub struct Survey {
     pub ignored: WallRegions,
     /// The frames, sorted by name, with their common mask.
     pub frames: FrameSet,
+    /// The frames that are left out because they cannot be read (`frames.skip_bad`).
+    pub skipped: Vec<SkippedFrame>,
     /// The initial poses, one per frame.
     pub initial: Trajectory,
     /// The frames that the file of the initial poses leaves out, and whose initial poses are
@@ -134,6 +137,10 @@ impl Survey {
         let listed = FrameList::new(&file.frames, &toml_path, &folder, None)?;
         let size = (camera.width, camera.height);
         let (listed, orientation_warning) = listed.oriented(size, &file.frames);
+        let (listed, skipped) = match file.frames.skip_bad {
+            Some(true) => skipped_frames::skip_unreadable(listed, size)?,
+            _ => (listed, Vec::new()),
+        };
         let FrameList {
             frames,
             times_s,
@@ -157,6 +164,7 @@ impl Survey {
             radius_sigma,
             ignored,
             frames: FrameSet::new(frames, mask),
+            skipped,
             initial: Vec::new(),
             pose_gaps: Vec::new(),
             truth: None,
@@ -199,6 +207,7 @@ impl Survey {
             None => None,
         };
         warnings.extend(orientation_warning);
+        warnings.extend(survey.skipped_sentence());
         warnings.extend(
             video
                 .iter()
@@ -244,8 +253,7 @@ impl Survey {
         surface: &dyn Surface,
         missing: MissingPoses,
     ) -> Result<ReadPoses, SurveyError> {
-        let times_s = self.times_s.as_deref();
-        let reader = PoseReader::new(section, &self.folder, &self.frames, times_s)?;
+        let reader = PoseReader::new(section, &self.folder, &self.frames_to_pose())?;
         let reading = reader.read(path, missing)?;
         let trajectory = reading.trajectory();
         let poses = poses_of(&trajectory);
@@ -257,6 +265,21 @@ impl Survey {
             gaps: reading.gaps,
             warnings,
         })
+    }
+
+    /// A sentence that names the frames that are left out because they cannot be read, if there are
+    /// any.
+    pub fn skipped_sentence(&self) -> Option<String> {
+        skipped_frames::sentence(&self.skipped, self.frames.len())
+    }
+
+    /// The frames that poses are read for.
+    pub(super) fn frames_to_pose(&self) -> FramesToPose<'_> {
+        FramesToPose {
+            frames: &self.frames,
+            skipped: &self.skipped,
+            times_s: self.times_s.as_deref(),
+        }
     }
 
     /// The files of the survey except the frames, even if others were read in their place.
