@@ -109,6 +109,8 @@ pub const REFINEMENT_FILE: &str = "refine.json";
 pub const SECTIONS_FILE: &str = "sections.csv";
 /// Name of the mask of what does not move with the wall, beside the poses.
 pub const OVERLAY_FILE: &str = "overlay.png";
+/// Name of the poses in a folder that `refine` has written.
+const POSES_FILE: &str = "poses.tum";
 /// Name of the covariances beside the poses.
 const COVARIANCES: &str = "covariance.csv";
 
@@ -139,20 +141,11 @@ impl RefinedFiles {
     /// # Errors
     /// [`ReportError`]: no poses, or files of another survey or version.
     pub fn read(survey: &Survey, path: &Path) -> Result<Self, ReportError> {
-        let poses_path = if path.is_dir() {
-            path.join("poses.tum")
-        } else {
-            path.to_owned()
-        };
-        if path.is_dir() && !poses_path.is_file() {
-            return Err(ReportError::NoPoses {
-                path: path.to_owned(),
-            });
-        }
+        let poses_path = poses_file(path)?;
         let poses = poses_of(&survey.read_poses(&poses_path)?);
         // The files beside belong to poses.tum only, not to other poses in the folder.
         let beside = |name: &str| {
-            let own = poses_path.file_name().is_some_and(|own| own == "poses.tum");
+            let own = poses_path.file_name().is_some_and(|own| own == POSES_FILE);
             let path = poses_path.with_file_name(name);
             (own && path.is_file()).then_some(path)
         };
@@ -187,6 +180,24 @@ impl RefinedFiles {
         ];
         let poses = std::iter::once(self.path.clone());
         poses.chain(others.into_iter().flatten()).collect()
+    }
+}
+
+/// The file of the poses: `path`, or the one in the folder `path` that `refine` has written.
+///
+/// # Errors
+/// [`ReportError::NoPoses`] for a folder without it.
+pub fn poses_file(path: &Path) -> Result<PathBuf, ReportError> {
+    if !path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let poses = path.join(POSES_FILE);
+    if poses.is_file() {
+        Ok(poses)
+    } else {
+        Err(ReportError::NoPoses {
+            path: path.to_owned(),
+        })
     }
 }
 

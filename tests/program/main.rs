@@ -6,6 +6,7 @@ mod broken_inputs;
 mod calibrate;
 mod check;
 mod colmap;
+mod command_line;
 mod compare;
 mod config;
 mod converge;

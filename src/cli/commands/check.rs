@@ -21,9 +21,6 @@ pub struct CheckArguments {
     survey: PathBuf,
     #[command(flatten)]
     reading: PoseReadingArguments,
-    /// Print the result as JSON.
-    #[arg(long)]
-    json: bool,
     /// Exit with code 4 if there is any warning.
     #[arg(long)]
     strict: bool,
@@ -46,7 +43,7 @@ pub fn run(arguments: &CheckArguments, terminal: &Terminal) -> Result<(), Failur
     }
     let survey = arguments.reading.open_quietly(&arguments.survey)?;
     let check = check::check(&survey)?;
-    if arguments.json {
+    if terminal.is_json() {
         json::print(&check)?;
     } else {
         terminal.say(summary(&check));
@@ -55,10 +52,7 @@ pub fn run(arguments: &CheckArguments, terminal: &Terminal) -> Result<(), Failur
         }
     }
     if let Some(path) = &arguments.write_mask {
-        let said = write_mask(&check, path)?;
-        if !arguments.json {
-            terminal.say(said);
-        }
+        terminal.say(write_mask(&check, path)?);
     }
     conclude(&check, arguments.strict)
 }

@@ -10,6 +10,7 @@ use crate::files::printed;
 use crate::persist::atomic::{self, OutputSet, StagedFolder, WriteError};
 use crate::trajectory::{StampedPose, colmap, csv, kitti, nerfstudio, tum};
 use clap::ValueEnum;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Writes poses in another format, in the tunnel's frame and the convention of the format.
@@ -97,12 +98,7 @@ pub fn run(
             outputs.folder(stage_colmap(out, &camera()?, &names(), &trajectory)?)?;
             record.add_to(&mut outputs, &out.join(RUN_FILE), &inputs)?;
             outputs.commit()?;
-            terminal.say(format!(
-                "wrote {} poses to {}",
-                trajectory.len(),
-                printed(out)
-            ));
-            return Ok(());
+            return print_result(out, trajectory.len(), terminal);
         }
     };
     create_parent_folder(out)?;
@@ -110,12 +106,19 @@ pub fn run(
     outputs.write_text(out, &text)?;
     record.add_to(&mut outputs, &record::path_beside(out), &inputs)?;
     outputs.commit()?;
-    terminal.say(format!(
-        "wrote {} poses to {}",
-        trajectory.len(),
-        printed(out)
-    ));
-    Ok(())
+    print_result(out, trajectory.len(), terminal)
+}
+
+/// The result, for `--json`.
+#[derive(Serialize)]
+struct ConvertReport<'a> {
+    out: &'a Path,
+    poses: usize,
+}
+
+fn print_result(out: &Path, poses: usize, terminal: &Terminal) -> Result<(), Failure> {
+    terminal.say(format!("wrote {poses} poses to {}", printed(out)));
+    terminal.result(&ConvertReport { out, poses })
 }
 
 /// The failure of a format that cannot hold the camera's lens.

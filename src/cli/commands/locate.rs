@@ -95,9 +95,6 @@ pub struct LocateArguments {
         allow_hyphen_values = true
     )]
     twelve_at_deg: f64,
-    /// Print the answer as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 /// A pixel of a frame.
@@ -223,7 +220,7 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
             })
             .collect(),
     };
-    if arguments.json {
+    if terminal.is_json() {
         return json::print(&located);
     }
     print_point(&located, survey.frames.len(), terminal);

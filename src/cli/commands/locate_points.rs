@@ -8,6 +8,7 @@ use crate::render::{hit_of_pixel, place_frames};
 use crate::survey::Survey;
 use crate::trajectory::Pose;
 use csv::StringRecord;
+use serde::Serialize;
 use std::path::Path;
 
 /// Columns of the input.
@@ -76,7 +77,19 @@ pub fn locate_points(
         "wrote {}: {found} of {count} pixels show the wall",
         printed(out)
     ));
-    Ok(())
+    terminal.result(&PointsReport {
+        out,
+        pixels: count,
+        on_wall: found,
+    })
+}
+
+/// The result, for `--json`.
+#[derive(Serialize)]
+struct PointsReport<'a> {
+    out: &'a Path,
+    pixels: usize,
+    on_wall: usize,
 }
 
 /// Finds the columns of the input among its headers; returns what is missing.

@@ -8,6 +8,7 @@ use crate::frames::{FrameFile, add_picture, load_colour, open_picture};
 use crate::persist::atomic::OutputSet;
 use crate::render::{Picture, cylinder};
 use image::ImageDecoder;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Projects one photo onto a cylinder around the camera.
@@ -87,7 +88,22 @@ pub fn run(
         result.origin_px[0],
         result.origin_px[1]
     ));
-    Ok(())
+    terminal.result(&ProjectReport {
+        out: &arguments.out,
+        width: result.image.width(),
+        height: result.image.height(),
+        origin_px: result.origin_px,
+    })
+}
+
+/// The result, for `--json`.
+#[derive(Serialize)]
+struct ProjectReport<'a> {
+    out: &'a Path,
+    width: u32,
+    height: u32,
+    /// Coordinates û, v̂ of the first pixel on the cylinder, pixels.
+    origin_px: [i64; 2],
 }
 
 /// The pinhole camera that the arguments describe, for the size of the photo.
