@@ -127,7 +127,6 @@ fn colours_are_for_terminals() {
     assert!(!succeed(&["--help"]).contains('\u{1b}'));
 }
 
-/// Where only the path differs, so does the text that names it.
 #[test]
 fn poses_may_be_named_by_the_folder_of_refine() {
     let survey = first_frames(6);

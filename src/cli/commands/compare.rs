@@ -27,11 +27,10 @@ use tunnelstitch_core::PROGRAM;
 pub struct CompareArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
-    /// Folder that refine has written, or poses in any format, in the tunnel's frame as `refine` and
-    /// `convert` write them.
-    /// The flags for reading poses apply to those of the survey only; convert poses of another
-    /// convention first. Camera and wall are those that `refine` has found and written beside them,
-    /// for all poses.
+    /// Folder that refine has written, or poses in any format, in the tunnel's frame as `refine`
+    /// and `convert` write them. The flags for reading poses apply to those of the survey only;
+    /// convert poses of another convention first. Camera and wall are those that `refine` has found
+    /// and written beside them, for all poses.
     #[arg(long, value_name = "DIR|FILE")]
     refined: PathBuf,
     /// Folder for the results; created if missing.

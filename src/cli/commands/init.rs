@@ -74,7 +74,7 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
     })
 }
 
-/// What was found and written, for `--json`; paths are relative to the folder.
+/// The parts that were found, for `--json`; paths are relative to the folder.
 #[derive(Serialize)]
 struct InitReport<'a> {
     survey_file: &'a Path,
@@ -84,7 +84,7 @@ struct InitReport<'a> {
     calibration: Option<&'a Path>,
     initial_poses: Option<&'a Path>,
     true_poses: Option<&'a Path>,
-    /// What keeps the survey from being used, if anything does.
+    /// The error that keeps the survey from being used, if there is one.
     missing: Option<String>,
 }
 

@@ -32,7 +32,7 @@ pub enum FrameError {
         path: PathBuf,
         /// The error of the decoder.
         what: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: &'static str,
     },
     /// A video cannot be read.
@@ -54,8 +54,8 @@ pub enum FrameError {
     /// A frame's size differs from the calibration's.
     #[error(
         "frame {index} ({}): {width} × {height} px, but the calibration is for {expected_width} × \
-         {expected_height} px; give the calibration of these frames, or leave out what cannot be read by \
-         --skip-bad (skip_bad = true under [frames])",
+         {expected_height} px; give the calibration of these frames, or leave out what cannot be \
+         read by --skip-bad (skip_bad = true under [frames])",
         printed(path)
     )]
     Size {
@@ -75,7 +75,7 @@ pub enum FrameError {
 }
 
 impl FrameError {
-    /// What is wrong, without the name of the frame and the remedy.
+    /// The reason of the failure, without the name of the frame and the remedy.
     pub fn reason(&self) -> String {
         match self {
             Self::Decode { what, .. } => what.clone(),

@@ -1,7 +1,7 @@
 //! Association of poses with frames.
 
 use super::error::SurveyError;
-use super::skipped_frames::SkippedFrame;
+use super::skipped_frame::SkippedFrame;
 use crate::frames::FrameFile;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;

@@ -5,12 +5,13 @@ use super::error::SurveyError;
 use super::file::read_survey_file;
 use super::file::{SURVEY_FILE, SurveyFile};
 use super::frame_list::FrameList;
+use super::frame_skipping::skip_unreadable;
 use super::masked_wall::MaskedWall;
 use super::missing_poses::{self, MissingPoses, PoseGap};
 use super::pose_reader::{FramesToPose, PoseReader};
 use super::poses_section::PosesSection;
 use super::shape_file::ShapeFile;
-use super::skipped_frames::{self, SkippedFrame};
+use super::skipped_frame::{self, SkippedFrame};
 use super::{ignore, pose_validation};
 use crate::frames::{FrameSet, Mask, Video};
 use std::path::{Path, PathBuf};
@@ -138,7 +139,7 @@ impl Survey {
         let size = (camera.width, camera.height);
         let (listed, orientation_warning) = listed.oriented(size, &file.frames);
         let (listed, skipped) = match file.frames.skip_bad {
-            Some(true) => skipped_frames::skip_unreadable(listed, size)?,
+            Some(true) => skip_unreadable(listed, size)?,
             _ => (listed, Vec::new()),
         };
         let FrameList {
@@ -270,7 +271,7 @@ impl Survey {
     /// A sentence that names the frames that are left out because they cannot be read, if there are
     /// any.
     pub fn skipped_sentence(&self) -> Option<String> {
-        skipped_frames::sentence(&self.skipped, self.frames.len())
+        skipped_frame::sentence(&self.skipped, self.frames.len())
     }
 
     /// The frames that poses are read for.

@@ -5,7 +5,7 @@ use super::error::SurveyError;
 use super::frame_times;
 use super::missing_poses::{self, MissingPoses, PoseGap};
 use super::poses_section::PosesSection;
-use super::skipped_frames::SkippedFrame;
+use super::skipped_frame::SkippedFrame;
 use crate::frames::FrameFile;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;

@@ -1,25 +1,11 @@
-//! Frames that are left out because their files cannot be read.
+//! Leaving out of frames whose files cannot be read.
 
 use super::error::SurveyError;
 use super::frame_list::FrameList;
+use super::skipped_frame::SkippedFrame;
 use crate::frames::{FrameError, FrameSet, load_colour};
-use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-
-/// Most names of frames in a message.
-const MAX_NAMED_FRAMES: usize = 5;
-
-/// A frame that is left out because its file is missing, damaged or of another size.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SkippedFrame {
-    /// Its index among all frames that `frames.images` matches.
-    pub index: usize,
-    /// Its file.
-    pub file: String,
-    /// The reason why it cannot be read.
-    pub reason: String,
-}
 
 /// Decodes all frames and leaves out those that cannot be decoded or are not of `size`; the others
 /// are renumbered.
@@ -59,28 +45,6 @@ pub(super) fn skip_unreadable(
     Ok((list, skipped))
 }
 
-/// A sentence that names frames that are left out, if there are any. `others`: the number of those
-/// that are used.
-pub(super) fn sentence(skipped: &[SkippedFrame], others: usize) -> Option<String> {
-    if skipped.is_empty() {
-        return None;
-    }
-    let named = skipped.iter().take(MAX_NAMED_FRAMES);
-    let named: Vec<String> = named
-        .map(|s| format!("{} ({})", s.file, s.reason))
-        .collect();
-    let more = match skipped.len() - named.len() {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    Some(format!(
-        "{} of {} frames cannot be read and are left out: {}{more}",
-        skipped.len(),
-        skipped.len() + others,
-        named.join(", ")
-    ))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,9 +81,6 @@ mod tests {
         let indices: Vec<usize> = skipped.iter().map(|frame| frame.index).collect();
         assert_eq!(indices, [1, 2, 3]);
         assert_eq!(skipped[0].reason, "16 × 12 px, not 32 × 24 px");
-        let said = sentence(&skipped, 2).unwrap();
-        assert!(said.starts_with("3 of 5 frames cannot be read"), "{said}");
-        assert_eq!(sentence(&[], 2), None);
     }
 
     #[test]
