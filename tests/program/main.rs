@@ -15,6 +15,7 @@ mod export;
 mod faults;
 mod fittings;
 mod fuzzed;
+mod gis;
 mod gyro;
 mod lenses;
 mod locate;
