@@ -132,7 +132,8 @@ impl Map {
         &self.values
     }
 
-    /// Adds the map of a quantity to a set of outputs, as Cloud-Optimised GeoTIFF of single precision.
+    /// Adds the map of a quantity to a set of outputs, as Cloud-Optimised GeoTIFF of single
+    /// precision.
     ///
     /// # Errors
     /// As [`CogWriter`].
