@@ -141,7 +141,12 @@ impl RefinedFiles {
     /// # Errors
     /// [`ReportError`]: no poses, or files of another survey or version.
     pub fn read(survey: &Survey, path: &Path) -> Result<Self, ReportError> {
-        let poses_path = poses_file(path)?;
+        let poses_path = poses_file(path);
+        if poses_path.is_dir() {
+            return Err(ReportError::NoPoses {
+                path: path.to_owned(),
+            });
+        }
         let poses = poses_of(&survey.read_poses(&poses_path)?);
         // The files beside belong to poses.tum only, not to other poses in the folder.
         let beside = |name: &str| {
@@ -183,21 +188,14 @@ impl RefinedFiles {
     }
 }
 
-/// The file of the poses: `path`, or the one in the folder `path` that `refine` has written.
-///
-/// # Errors
-/// [`ReportError::NoPoses`] for a folder without it.
-pub fn poses_file(path: &Path) -> Result<PathBuf, ReportError> {
-    if !path.is_dir() {
-        return Ok(path.to_owned());
-    }
+/// The poses that `refine` has written into the folder `path`; `path` itself if it is a file or a
+/// folder of other poses, such as a model of COLMAP.
+pub fn poses_file(path: &Path) -> PathBuf {
     let poses = path.join(POSES_FILE);
     if poses.is_file() {
-        Ok(poses)
+        poses
     } else {
-        Err(ReportError::NoPoses {
-            path: path.to_owned(),
-        })
+        path.to_owned()
     }
 }
 

@@ -76,7 +76,7 @@ pub fn run(
             "--max-wall-px needs true poses, and the survey has no poses.truth",
         ));
     }
-    let refined_file = poses_file(&arguments.refined)?;
+    let refined_file = poses_file(&arguments.refined);
     let refined = poses_of(&survey.read_poses(&refined_file)?);
     leave_out_overlay(&mut survey, terminal)?;
     atomic::create_folder(&arguments.out)?;
