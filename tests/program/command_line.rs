@@ -2,8 +2,9 @@
 
 use crate::support::{fail, first_frames, succeed, text, tunnelstitch};
 use serde_json::Value;
+use std::io::Write;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 /// The one JSON document that a command prints; nothing may follow it.
 #[track_caller]
@@ -140,7 +141,6 @@ fn poses_may_be_named_by_the_folder_of_refine() {
     };
     let refused = compare(&refined, "none");
     assert_eq!(refused.status.code(), Some(3));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("poses.tum"));
     std::fs::copy(dir.join("groundtruth.tum"), refined.join("poses.tum")).unwrap();
     let [by_folder, by_file] = [
         compare(&refined, "a"),
@@ -149,4 +149,48 @@ fn poses_may_be_named_by_the_folder_of_refine() {
     assert!(by_folder.status.success() && by_file.status.success());
     let report = |name: &str| std::fs::read(dir.join(name).join("compare.json")).unwrap();
     assert_eq!(report("a"), report("b"));
+}
+
+/// `-` is a stream: poses of `convert` into another program, pixels of `locate` out of one.
+#[test]
+fn a_hyphen_is_standard_input_or_output() {
+    let survey = first_frames(3);
+    let dir = survey.path();
+    let file = dir.join("poses.txt");
+    let convert =
+        |out: &str| ["convert", text(dir), "--to", "kitti", "--out", out].map(str::to_owned);
+    let of =
+        |arguments: &[String]| succeed(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    of(&convert(text(&file)));
+    assert_eq!(of(&convert("-")), std::fs::read_to_string(&file).unwrap());
+    let colmap = ["convert", text(dir), "--to", "colmap", "--out", "-"];
+    assert!(fail(&colmap, 2).contains("folder"));
+    assert!(
+        fail(
+            &["convert", text(dir), "--to", "tum", "--out", "-", "--json"],
+            2
+        )
+        .contains("--json")
+    );
+
+    let pixels = "frame,u,v\n0,240,180\n1,100,90\n";
+    let (input, output) = (dir.join("pixels.csv"), dir.join("points.csv"));
+    std::fs::write(&input, pixels).unwrap();
+    let locate = ["locate", text(dir), "--points"];
+    succeed(&[&locate[..], &[text(&input), "--out", text(&output)]].concat());
+    let mut child = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+        .args([&locate[..], &["-", "--out", "-"]].concat())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(pixels.as_bytes())
+        .unwrap();
+    let printed = child.wait_with_output().unwrap();
+    assert!(printed.status.success());
+    assert_eq!(printed.stdout, std::fs::read(&output).unwrap());
 }

@@ -3,8 +3,8 @@
 use crate::camera::{ColmapCamera, UnknownModelError};
 use crate::cli::arguments::PosesArguments;
 use crate::cli::output::{
-    Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, record, refuse_overwriting,
-    survey_files,
+    Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, is_stream, json, record,
+    refuse_overwriting, refuse_two_results, survey_files,
 };
 use crate::files::printed;
 use crate::persist::atomic::{self, OutputSet, StagedFolder, WriteError};
@@ -31,7 +31,8 @@ pub struct ConvertArguments {
     /// Format of the output.
     #[arg(long, value_enum, value_name = "FORMAT")]
     to: OutputFormat,
-    /// The file to write; for colmap a folder, created if missing.
+    /// The file to write; for colmap a folder, created if missing. `-` prints the poses on standard
+    /// output, without a record of the run.
     #[arg(long, short, value_name = "PATH")]
     out: PathBuf,
     #[command(flatten)]
@@ -64,6 +65,7 @@ pub fn run(
 ) -> Result<(), Failure> {
     let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
     let out = &arguments.out;
+    refuse_two_results(out, terminal)?;
     refuse_overwriting(std::slice::from_ref(out), survey_files(&survey))?;
     let inputs = record::hash_survey(&survey, arguments.poses.file())?;
     let has_names = !matches!(arguments.to, OutputFormat::Tum | OutputFormat::Kitti);
@@ -93,6 +95,11 @@ pub fn run(
             let keys = keys.map_err(|error| unknown_model(&error, "colmap"))?;
             nerfstudio::format(keys, &survey.frame_paths_from(folder), &trajectory)
         }
+        OutputFormat::Colmap if is_stream(out) => {
+            return Err(Failure::usage(
+                "--to colmap writes a folder, which cannot be printed; name one by --out",
+            ));
+        }
         OutputFormat::Colmap => {
             let mut outputs = OutputSet::default();
             outputs.folder(stage_colmap(out, &camera()?, &names(), &trajectory)?)?;
@@ -101,6 +108,9 @@ pub fn run(
             return print_result(out, trajectory.len(), terminal);
         }
     };
+    if is_stream(out) {
+        return json::print_text(&text);
+    }
     create_parent_folder(out)?;
     let mut outputs = OutputSet::default();
     outputs.write_text(out, &text)?;

@@ -76,10 +76,11 @@ pub struct LocateArguments {
     frame: Option<FramePixel>,
     /// Many pixels: a CSV file with the columns frame (name of its file, or its index from 0), u
     /// and v. They are copied to --out with the columns theta_rad, h_m and range_m (distance from
-    /// the camera) added, empty where the frame shows no wall.
+    /// the camera) added, empty where the frame shows no wall. `-` is
+    /// standard input.
     #[arg(long, group = "point", value_name = "IN.csv", requires = "out")]
     points: Option<PathBuf>,
-    /// The file to write for --points.
+    /// The file to write for --points; `-` is standard output.
     #[arg(long, short, value_name = "OUT.csv", requires = "points")]
     out: Option<PathBuf>,
     #[command(flatten)]
