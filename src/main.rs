@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::{Arc, atomic::AtomicBool};
-use tunnelstitch::cli::{Failure, print_error};
+use tunnelstitch::cli::{Failure, print_failure};
 
 /// In the text of a panic: a `TryReserveError` of the standard library for memory that is not
 /// there.
@@ -16,7 +16,7 @@ fn main() -> ExitCode {
         tunnelstitch::persist::remove_unfinished();
         let what = panic.to_string();
         let failure = if what.contains(NO_MEMORY) {
-            Failure::temporary(format!("error: memory has ended: {what}"))
+            Failure::temporary(format!("memory has ended: {what}"))
         } else {
             Failure::bug(format!(
                 "bug in tunnelstitch {}: {what}\nplease report it with the command line and, if \
@@ -24,7 +24,7 @@ fn main() -> ExitCode {
                 env!("CARGO_PKG_VERSION")
             ))
         };
-        print_error(&failure.message);
+        print_failure(&failure);
         std::process::exit(failure.code.into());
     }));
     block_file_size_signal();
@@ -32,7 +32,7 @@ fn main() -> ExitCode {
     match tunnelstitch::cli::run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            print_error(&format!("error: {}", failure.message));
+            print_failure(&failure);
             ExitCode::from(failure.code)
         }
     }

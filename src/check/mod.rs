@@ -1,7 +1,7 @@
 //! Check of a survey before it is refined: frames, overlap, expected jitter, texture, effort, and
 //! what to do about them.
 //!
-//! Up to 64 frames are decoded; of the others only the headers are read.
+//! Up to 64 frames are decoded; of the others only start and end are read.
 //! Everything else is geometry of the initial poses.
 //!
 //! ```text

@@ -1,10 +1,8 @@
 //! Exposure, noise and texture of a dozen frames.
 
 use super::statistics::median_or_zero;
-use crate::files::printed;
 use crate::frames::{FrameFile, GreyImage, StoredFrame, colour_type, noise_sigma};
 use crate::survey::Survey;
-use rayon::prelude::*;
 use serde::Serialize;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
@@ -41,21 +39,24 @@ pub struct PictureCheck {
 }
 
 impl PictureCheck {
-    /// Decodes a dozen frames and reads the headers of all; also returns the faults.
+    /// Decodes a dozen frames and examines start and end of all; also returns the faults.
     pub(super) fn of(survey: &Survey) -> (Self, Vec<String>) {
         let (width, height) = (survey.camera.width, survey.camera.height);
-        let mut faults: Vec<String> = survey
-            .frames
-            .par_iter()
-            .filter_map(|file| header_fault(file, [width, height]))
-            .collect();
+        let examined = (survey.frames).par_map(|file| {
+            file.examine(width, height)
+                .err()
+                .map(|error| error.to_string())
+        });
+        let step = survey.frames.len().div_ceil(MAX_DECODED_FRAMES).max(1);
+        let sound = survey.frames.iter().zip(&examined);
+        let sound = sound.filter_map(|(file, fault)| fault.is_none().then_some(file));
+        let sampled: Vec<&FrameFile> = sound.step_by(step).collect();
+        let mut faults: Vec<String> = examined.into_iter().flatten().collect();
         if faults.len() > MAX_LISTED_FAULTS {
             let more = faults.len() - MAX_LISTED_FAULTS;
             faults.truncate(MAX_LISTED_FAULTS);
             faults.push(format!("and {more} more frames have such faults"));
         }
-        let step = survey.frames.len().div_ceil(MAX_DECODED_FRAMES).max(1);
-        let sampled: Vec<&FrameFile> = survey.frames.iter().step_by(step).collect();
         let decoded: Vec<Result<(GreyImage, Option<u32>), String>> =
             sampled.par_map(|file| match StoredFrame::decode(file, width, height) {
                 Ok(frame) => {
@@ -78,8 +79,7 @@ impl PictureCheck {
                     used_bits,
                     ..measure(&picture, hidden)
                 }),
-                Err(fault) if !faults.contains(&fault) => faults.push(fault),
-                Err(_) => {}
+                Err(fault) => faults.push(fault),
             }
         }
         let of = |value: fn(&Self) -> f64| median_or_zero(pictures.iter().map(value));
@@ -93,19 +93,6 @@ impl PictureCheck {
             sigma_px: of(|p| p.sigma_px),
         };
         (check, faults)
-    }
-}
-
-/// Fault of a frame that its file's header shows.
-fn header_fault(file: &FrameFile, size: [u32; 2]) -> Option<String> {
-    let name = format!("frame {} ({})", file.index, printed(&file.path));
-    match file.size() {
-        Err(error) => Some(error.to_string()),
-        Ok((width, height)) if [width, height] != size => Some(format!(
-            "{name}: {width} × {height} px, but the calibration is for {} × {} px",
-            size[0], size[1]
-        )),
-        Ok(_) => None,
     }
 }
 

@@ -5,7 +5,10 @@ use super::commands::{
     refine, report, shell, simulate, stitch, view,
 };
 use super::configuration;
-use super::output::{Failure, RunRecord, Terminal, print_error};
+use super::help::group_commands;
+use super::output::{
+    Failure, RunRecord, Terminal, print_error, print_failures_as_json, refused_arguments,
+};
 use crate::persist::atomic;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::sync::Arc;
@@ -33,6 +36,10 @@ struct GlobalArguments {
     /// Print no progress bars and no summaries, only errors, warnings and the output of --json.
     #[arg(long, short, global = true)]
     quiet: bool,
+    /// Print the result as one JSON document on standard output instead of a summary, and an error
+    /// as one line {"error": ..., "exit_code": ...} on standard error.
+    #[arg(long, global = true)]
+    json: bool,
     /// Number of threads [default: all cores]. The result does not depend on it.
     #[arg(
         long,
@@ -102,9 +109,12 @@ enum Command {
 /// # Errors
 /// [`Failure`] with the text to print and the exit code.
 pub fn run() -> Result<(), Failure> {
-    let command = configuration::with_variables(Cli::command());
-    let parsed = configuration::parse(&command, std::env::args_os().collect())?;
-    let cli = Cli::from_arg_matches(&parsed.matches).unwrap_or_else(|error| error.exit());
+    let arguments: Vec<_> = std::env::args_os().collect();
+    print_failures_as_json(configuration::asks_for_json(&arguments));
+    let command = configuration::with_variables(group_commands(Cli::command()));
+    let parsed = configuration::parse(&command, arguments)?;
+    let cli = Cli::from_arg_matches(&parsed.matches).map_err(|error| refused_arguments(&error))?;
+    print_failures_as_json(cli.global.json);
     let record = RunRecord {
         command: parsed.command,
         arguments: command_line(),
@@ -122,7 +132,7 @@ pub fn run() -> Result<(), Failure> {
         })?;
     limit_simd(cli.global.simd.into());
     handle_interrupts(&cli.command)?;
-    let terminal = Arc::new(Terminal::new(cli.global.quiet));
+    let terminal = Arc::new(Terminal::new(cli.global.quiet, cli.global.json));
     cli.command.run(&command, &record, &terminal)
 }
 
@@ -185,10 +195,11 @@ mod tests {
         CONFIGURABLE, EffectiveOption, options_of_command, parse, with_variables,
     };
     use super::*;
+    use crate::cli::help::grouped_names;
     use std::ffi::OsString;
 
     fn definition() -> clap::Command {
-        with_variables(Cli::command())
+        with_variables(group_commands(Cli::command()))
     }
 
     fn survey(options: &str) -> tempfile::TempDir {
@@ -213,6 +224,20 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         definition().debug_assert();
+    }
+
+    #[test]
+    fn every_command_stands_under_a_heading() {
+        let command = definition();
+        let mut names: Vec<&str> = command
+            .get_subcommands()
+            .map(clap::Command::get_name)
+            .collect();
+        names.push("help");
+        let mut grouped = grouped_names();
+        names.sort_unstable();
+        grouped.sort_unstable();
+        assert_eq!(names, grouped);
     }
 
     #[test]

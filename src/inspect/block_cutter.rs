@@ -32,6 +32,7 @@ fn raster_spec(canvas: &Canvas, format: PixelFormat) -> RasterSpec {
         nodata: None,
         reduce: Reduce::Mean,
         georeference: None,
+        quantity: None,
     }
 }
 

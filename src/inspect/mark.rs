@@ -27,7 +27,7 @@ enum FeatureKind {
     Feature,
 }
 
-/// Position on the unrolled wall: arc length and chainage, metres.
+/// Position on the unrolled wall: chainage and arc length, metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", content = "coordinates")]
 pub enum Geometry {
@@ -36,6 +36,16 @@ pub enum Geometry {
     /// A measured line. Arc lengths may exceed the perimeter, so that the line takes the shorter
     /// way around.
     LineString([[f64; 2]; 2]),
+}
+
+impl Geometry {
+    /// The point, or both ends of the line.
+    fn places(&self) -> &[[f64; 2]] {
+        match self {
+            Self::Point(place) => std::slice::from_ref(place),
+            Self::LineString(places) => places,
+        }
+    }
 }
 
 /// Attributes of a defect and its position in an inspector's terms.
@@ -91,7 +101,32 @@ pub struct MarkVersions {
     pub sent: Option<Mark>,
 }
 
+/// Largest difference of a coordinate and the chainage that it is, metres.
+const CHAINAGE_TOLERANCE_M: f64 = 1e-6;
+
 impl Mark {
+    /// The mark with chainage before arc length. Those of version 0.1 have arc length first, which
+    /// their chainages tell.
+    pub(super) fn with_chainage_first(mut self) -> Self {
+        let is_at = |axis: usize| {
+            let of_point = |(place, chainage_m): (&[f64; 2], Option<f64>)| {
+                chainage_m.is_none_or(|h_m| (place[axis] - h_m).abs() <= CHAINAGE_TOLERANCE_M)
+            };
+            let chainages = [
+                Some(self.properties.chainage_m),
+                self.properties.end_chainage_m,
+            ];
+            self.geometry.places().iter().zip(chainages).all(of_point)
+        };
+        if is_at(1) && !is_at(0) {
+            match &mut self.geometry {
+                Geometry::Point(place) => place.reverse(),
+                Geometry::LineString(places) => places.iter_mut().for_each(|p| p.reverse()),
+            }
+        }
+        self
+    }
+
     /// Validates the mark.
     ///
     /// # Errors
@@ -101,14 +136,11 @@ impl Mark {
         let name = |c: char| c.is_ascii_alphanumeric() || c == '-';
         let numbers = [p.chainage_m, p.theta_deg, p.x_m, p.y_m, p.z_m];
         let optional = [p.end_chainage_m, p.length_m, p.width_mm];
-        let places = match &self.geometry {
-            Geometry::Point(place) => vec![*place],
-            Geometry::LineString(places) => places.to_vec(),
-        };
+        let places = self.geometry.places();
         let all = numbers
             .into_iter()
             .chain(optional.into_iter().flatten())
-            .chain(places.into_iter().flatten());
+            .chain(places.iter().flatten().copied());
         let texts = [&p.class, &p.note, &p.clock, &p.layer, &p.created];
         let wrong = [
             (

@@ -1,7 +1,7 @@
 //! Defects marked by the inspector: a GeoJSON file and a CSV table.
 //!
 //! `marks.geojson` is the file that is read again; `marks.csv` is written along with it.
-//! Coordinates are arc length and chainage on the unrolled wall, metres, as in a GeoTIFF of
+//! Coordinates are chainage and arc length on the unrolled wall, metres, as in a GeoTIFF of
 //! `stitch`, so that both coincide in a GIS.
 
 use crate::files::limits::MAX_MARKS_BYTES;
@@ -103,7 +103,7 @@ impl Marks {
         if let Err(what) = mark.validate() {
             return Err(self.fail(MARKS_GEOJSON, what.to_owned()));
         }
-        self.change(mark.id.clone(), Some(mark))
+        self.change(mark.id.clone(), Some(mark.with_chainage_first()))
     }
 
     /// Removes the mark with an identifier, if it exists, and writes the files.
@@ -236,8 +236,10 @@ fn read_marks(path: &Path) -> Result<Collection, InspectError> {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Collection::empty()),
         Err(error) => return Err(fail(error.to_string())),
     };
-    let content: Collection = serde_json::from_str(text.trim_start_matches('\u{feff}'))
+    let mut content: Collection = serde_json::from_str(text.trim_start_matches('\u{feff}'))
         .map_err(|error| fail(error.to_string()))?;
+    let marks = content.features.into_iter();
+    content.features = marks.map(Mark::with_chainage_first).collect();
     let mut marks = content.features.iter();
     match marks.find_map(|mark| Some((mark, mark.validate().err()?))) {
         Some((mark, what)) => Err(fail(format!("mark {:?}: {what}", mark.id))),
@@ -258,7 +260,7 @@ mod tests {
         let text = format!(
             r#"{{"type": "Feature", "id": "{id}",
             "geometry": {{
-                "type": "LineString", "coordinates": [[1.5, {chainage_m}], [1.5, 2.0]]
+                "type": "LineString", "coordinates": [[{chainage_m}, 1.5], [2.0, 1.5]]
             }},
             "properties": {{"class": "BAB", "severity": 3, "note": "wet, \"open\"",
             "chainage_m": {chainage_m}, "clock": "4:30", "theta_deg": 135.0,
@@ -348,6 +350,25 @@ mod tests {
         assert!(marks.put(mark("a", 1.0)).is_err());
         assert!(marks.content.features.is_empty());
         assert!(!dir.path().join(MARKS_GEOJSON).exists());
+    }
+
+    /// Files of version 0.1 have arc length before chainage.
+    #[test]
+    fn coordinates_of_earlier_versions_are_put_in_order() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(MARKS_GEOJSON);
+        let present = Collection {
+            features: vec![mark("a", 4.0)],
+            ..Collection::empty()
+        };
+        let text = serde_json::to_string(&present).unwrap();
+        let earlier = text.replace("[[4.0,1.5],[2.0,1.5]]", "[[1.5,4.0],[1.5,2.0]]");
+        assert_ne!(text, earlier);
+        for file in [&earlier, &text] {
+            std::fs::write(&path, file).unwrap();
+            let marks = Marks::open(dir.path()).unwrap();
+            assert_eq!(marks.content.features, [mark("a", 4.0)]);
+        }
     }
 
     #[test]

@@ -266,6 +266,7 @@ fn notes(survey: &Survey, refined: &RefinedFiles, comparison: &Comparison) -> Ve
             }
         }
     }
+    notes.extend(survey.skipped_sentence().map(|sentence| sentence + "."));
     if refined.covariances.is_none() {
         notes.push(format!(
             "No {}, so the uncertainty is not known.",

@@ -50,6 +50,6 @@ pub use page::page;
 pub use pictures::{PICTURES, Pictures};
 pub use refined_files::{
     CalibratedUnknown, Calibration, OVERLAY_FILE, REFINEMENT_FILE, RefinedFiles, Refinement,
-    SECTIONS_FILE,
+    SECTIONS_FILE, poses_file,
 };
 pub use resolution::choose_resolution;

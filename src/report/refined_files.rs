@@ -8,7 +8,7 @@ use crate::refine::{
     FrameReport, LengthScale, LevelReport, MaskedReport, PointsReport, PriorTest, ShapeReport,
     StageTime, SurveyVerdict, read_covariances,
 };
-use crate::survey::{MASKED_FILE, MaskedWall, OverlayReport, Survey};
+use crate::survey::{MASKED_FILE, MaskedWall, OverlayReport, SkippedFrame, Survey};
 use crate::trajectory::{Pose, poses_of};
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
@@ -49,6 +49,9 @@ pub struct Refinement {
     /// The wall that was left out; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked: Option<MaskedReport>,
+    /// Frames that were left out because they cannot be read.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub skipped_frames: Vec<SkippedFrame>,
     /// Pixels that do not move with the wall; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub overlay: Option<OverlayReport>,
@@ -106,6 +109,8 @@ pub const REFINEMENT_FILE: &str = "refine.json";
 pub const SECTIONS_FILE: &str = "sections.csv";
 /// Name of the mask of what does not move with the wall, beside the poses.
 pub const OVERLAY_FILE: &str = "overlay.png";
+/// Name of the poses in a folder that `refine` has written.
+const POSES_FILE: &str = "poses.tum";
 /// Name of the covariances beside the poses.
 const COVARIANCES: &str = "covariance.csv";
 
@@ -136,12 +141,8 @@ impl RefinedFiles {
     /// # Errors
     /// [`ReportError`]: no poses, or files of another survey or version.
     pub fn read(survey: &Survey, path: &Path) -> Result<Self, ReportError> {
-        let poses_path = if path.is_dir() {
-            path.join("poses.tum")
-        } else {
-            path.to_owned()
-        };
-        if path.is_dir() && !poses_path.is_file() {
+        let poses_path = poses_file(path);
+        if poses_path.is_dir() {
             return Err(ReportError::NoPoses {
                 path: path.to_owned(),
             });
@@ -149,7 +150,7 @@ impl RefinedFiles {
         let poses = poses_of(&survey.read_poses(&poses_path)?);
         // The files beside belong to poses.tum only, not to other poses in the folder.
         let beside = |name: &str| {
-            let own = poses_path.file_name().is_some_and(|own| own == "poses.tum");
+            let own = poses_path.file_name().is_some_and(|own| own == POSES_FILE);
             let path = poses_path.with_file_name(name);
             (own && path.is_file()).then_some(path)
         };
@@ -184,6 +185,17 @@ impl RefinedFiles {
         ];
         let poses = std::iter::once(self.path.clone());
         poses.chain(others.into_iter().flatten()).collect()
+    }
+}
+
+/// The poses that `refine` has written into the folder `path`; `path` itself if it is a file or a
+/// folder of other poses, such as a model of COLMAP.
+pub fn poses_file(path: &Path) -> PathBuf {
+    let poses = path.join(POSES_FILE);
+    if poses.is_file() {
+        poses
+    } else {
+        path.to_owned()
     }
 }
 

@@ -1,6 +1,6 @@
 //! `init` and `check` through the program.
 
-use crate::support::{edit, fail, first_frames, succeed, text, tunnelstitch};
+use crate::support::{edit, fail, first_frames, simulate, succeed, text, tunnelstitch};
 
 #[test]
 fn a_folder_becomes_a_survey_and_is_sound() {
@@ -72,4 +72,26 @@ fn every_frame_that_does_not_fit_is_named() {
     );
     let message = fail(&["check", text(survey.path())], 3);
     assert!(message.contains("must be a positive number"), "{message}");
+}
+
+/// With `--strict`, what needs attention is an exit code; what makes `refine` fail keeps its own.
+#[test]
+fn a_strict_check_fails_where_there_is_a_warning() {
+    let dir = tempfile::tempdir().unwrap();
+    let sound = dir.path().join("sound");
+    let small = ["--frames", "25", "--size", "160x120", "--supersample", "2"];
+    simulate(&sound, &small);
+    succeed(&["check", text(&sound), "--strict"]);
+    let dark = dir.path().join("dark");
+    simulate(
+        &dark,
+        &[&small[..], &["--bad-frames", "0-24:black"]].concat(),
+    );
+    succeed(&["check", text(&dark)]);
+    for more in [&[][..], &["--json"]] {
+        let message = fail(&[&["check", text(&dark), "--strict"], more].concat(), 4);
+        assert!(message.contains("--strict: warnings"), "{message}");
+    }
+    std::fs::write(dark.join("frames/000003.png"), "no picture").unwrap();
+    fail(&["check", text(&dark), "--strict"], 3);
 }

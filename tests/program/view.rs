@@ -529,3 +529,28 @@ fn a_kilometre_streams() {
     );
     assert!(triangles < 100_000.0 && (1.0..512.0).contains(&mib));
 }
+
+/// The browser is given the address that is printed.
+#[cfg(unix)]
+#[test]
+fn the_page_is_opened_on_request() {
+    use std::os::unix::fs::PermissionsExt;
+    if npm::is_viewer_missing() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let site = export_site(dir.path(), "20");
+    let opened = dir.path().join("opened");
+    let browser = dir.path().join("xdg-open");
+    let script = format!("#!/bin/sh\nprintf %s \"$1\" > {}\n", text(&opened));
+    std::fs::write(&browser, script).unwrap();
+    std::fs::set_permissions(&browser, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_tunnelstitch"));
+    program.env("PATH", dir.path());
+    let server = Running::run(program, &[text(&site), "--open"]).unwrap();
+    let end = Instant::now() + Duration::from_secs(20);
+    while std::fs::read_to_string(&opened).unwrap_or_default() != server.address() {
+        assert!(Instant::now() < end, "nothing was opened");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}

@@ -180,6 +180,7 @@ fn write_text_files(
             mask: scene.shaft().map(|_| MASK_FILE.into()),
             bits: None,
             orientation: None,
+            skip_bad: None,
             overlay: None,
         },
         poses: PosesSection {

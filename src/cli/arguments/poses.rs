@@ -61,6 +61,11 @@ pub struct PoseReadingArguments {
     /// taking the nearer one.
     #[arg(long)]
     interpolate: bool,
+    /// Leave out frames whose files cannot be read (missing, damaged, or not of the calibration's
+    /// size), with a warning that names them, instead of failing. All frames are decoded once more
+    /// for it. What `refine` has made so is read so by other commands.
+    #[arg(long, help_heading = "Reading frames (overrides survey.toml)")]
+    skip_bad: bool,
 }
 
 /// Names of formats.
@@ -255,6 +260,7 @@ impl PoseReadingArguments {
             &mut file.frames.times,
             self.frame_times.as_deref().map(absolute),
         );
+        replace(&mut file.frames.skip_bad, self.skip_bad.then_some(true));
     }
 }
 
@@ -328,8 +334,8 @@ fn open_as_found(
     Ok(opened?)
 }
 
-/// Takes camera and wall from the survey.toml that `refine` has written beside `poses`, or into the
-/// folder `poses`, if it has.
+/// Takes camera, wall and the treatment of unreadable frames from the survey.toml that `refine` has
+/// written beside `poses`, or into the folder `poses`, if it has.
 ///
 /// # Errors
 /// A malformed file.
@@ -352,6 +358,8 @@ fn take_over_found(file: &mut SurveyFile, poses: &Path) -> Result<(), SurveyErro
     }
     file.camera = found.camera;
     file.tunnel = found.tunnel;
+    // The poses are those of the frames that could be read.
+    replace(&mut file.frames.skip_bad, found.frames.skip_bad);
     Ok(())
 }
 

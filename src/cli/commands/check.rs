@@ -10,19 +10,20 @@ use std::path::{Path, PathBuf};
 /// that refine needs.
 ///
 /// Exits with code 3 if anything would make refine or stitch fail. Warnings name what needs
-/// attention, and the remedy.
+/// attention, and the remedy; with --strict, any of them makes the exit code 4.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch check my-survey\n  \
+    tunnelstitch check my-survey --strict && tunnelstitch refine my-survey --out refined\n  \
     tunnelstitch check my-survey --write-mask my-survey/mask.png")]
 pub struct CheckArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
     #[command(flatten)]
     reading: PoseReadingArguments,
-    /// Print the result as JSON.
+    /// Exit with code 4 if there is any warning.
     #[arg(long)]
-    json: bool,
+    strict: bool,
     /// Write a mask that hides what does not move with the wall, such as burnt-in text, logos and
     /// dirt on the lens, and what the survey's own mask hides: black where the wall is never seen.
     #[arg(long, value_name = "FILE.png")]
@@ -35,14 +36,14 @@ pub struct CheckArguments {
 /// Runs the command.
 ///
 /// # Errors
-/// Everything that makes the survey unusable.
+/// Everything that makes the survey unusable; with --strict, any warning.
 pub fn run(arguments: &CheckArguments, terminal: &Terminal) -> Result<(), Failure> {
     if let Some(path) = &arguments.write_mask {
         refuse_existing(path, arguments.force)?;
     }
     let survey = arguments.reading.open_quietly(&arguments.survey)?;
     let check = check::check(&survey)?;
-    if arguments.json {
+    if terminal.is_json() {
         json::print(&check)?;
     } else {
         terminal.say(summary(&check));
@@ -51,16 +52,23 @@ pub fn run(arguments: &CheckArguments, terminal: &Terminal) -> Result<(), Failur
         }
     }
     if let Some(path) = &arguments.write_mask {
-        let said = write_mask(&check, path)?;
-        if !arguments.json {
-            terminal.say(said);
-        }
+        terminal.say(write_mask(&check, path)?);
     }
-    if check.faults.is_empty() {
-        Ok(())
-    } else {
-        Err(Failure::input(check.faults.join("\nerror: ")))
+    conclude(&check, arguments.strict)
+}
+
+/// Fails if anything would make refine or stitch fail or, with `strict`, if there is any warning.
+fn conclude(check: &Check, strict: bool) -> Result<(), Failure> {
+    if !check.faults.is_empty() {
+        return Err(Failure::input(check.faults.join("\nerror: ")));
     }
+    if strict && !check.warnings.is_empty() {
+        return Err(Failure::quality(format!(
+            "--strict: warnings that need attention: {}",
+            check.warnings.len()
+        )));
+    }
+    Ok(())
 }
 
 /// Refuses a mask in place of an existing file, or of another format than PNG.

@@ -9,6 +9,7 @@ use crate::frames::{PictureFormat, add_picture};
 use crate::persist::atomic::{self, OutputSet};
 use crate::progress::Progress;
 use crate::render::Layout;
+use crate::report::poses_file;
 use crate::survey::Survey;
 use crate::trajectory::poses_of;
 use image::DynamicImage;
@@ -22,24 +23,21 @@ use tunnelstitch_core::PROGRAM;
 /// before-after.png (an extract of the first above the second) and compare.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  \
-    tunnelstitch compare my-survey --refined refined/poses.tum --out compared")]
+    tunnelstitch compare my-survey --refined refined --out compared")]
 pub struct CompareArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
-    /// The refined poses in any format, in the tunnel's frame as `refine` and `convert` write them.
-    /// The flags for reading poses apply to those of the survey only; convert poses of another
-    /// convention first. Camera and wall are those that `refine` has found and written beside them,
-    /// for all poses.
-    #[arg(long, value_name = "FILE")]
+    /// Folder that refine has written, or poses in any format, in the tunnel's frame as `refine`
+    /// and `convert` write them. The flags for reading poses apply to those of the survey only;
+    /// convert poses of another convention first. Camera and wall are those that `refine` has found
+    /// and written beside them, for all poses.
+    #[arg(long, value_name = "DIR|FILE")]
     refined: PathBuf,
     /// Folder for the results; created if missing.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     picture: PictureArguments,
-    /// Print compare.json on standard output instead of the table.
-    #[arg(long)]
-    json: bool,
     /// Exit with code 4 if the error of the refined poses on the wall (root mean square, pixels) is
     /// larger than this. Needs true poses.
     #[arg(long, value_name = "X", value_parser = positive)]
@@ -78,8 +76,9 @@ pub fn run(
             "--max-wall-px needs true poses, and the survey has no poses.truth",
         ));
     }
-    let refined = poses_of(&survey.read_poses(&arguments.refined)?);
-    leave_out_overlay(&mut survey, arguments.json, terminal)?;
+    let refined_file = poses_file(&arguments.refined);
+    let refined = poses_of(&survey.read_poses(&refined_file)?);
+    leave_out_overlay(&mut survey, terminal)?;
     atomic::create_folder(&arguments.out)?;
     let (comparison, drawings) = compare_survey(
         &survey,
@@ -90,17 +89,17 @@ pub fn run(
     )?;
     let (json, mut outputs) = stage_comparison(
         &survey,
-        &arguments.refined,
+        &refined_file,
         arguments.picture.canvas.layout.into(),
         &comparison,
         drawings,
         &arguments.out,
         terminal,
     )?;
-    let inputs = record::hash_survey(&survey, [arguments.refined.as_path()])?;
+    let inputs = record::hash_survey(&survey, [refined_file.as_path()])?;
     record.add_to(&mut outputs, &arguments.out.join(RUN_FILE), &inputs)?;
     outputs.commit()?;
-    if arguments.json {
+    if terminal.is_json() {
         json::print_text(&json)?;
     } else {
         terminal.say(comparison.to_string());

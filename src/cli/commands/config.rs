@@ -23,9 +23,6 @@ pub struct ConfigArguments {
     /// Show only the options of this command.
     #[arg(value_parser = CONFIGURABLE)]
     command: Option<String>,
-    /// Print as JSON: the survey's file, and each option with its value and source.
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Serialize)]
@@ -82,7 +79,7 @@ pub fn run(
         });
         output.options.insert(name, options.collect());
     }
-    if arguments.json {
+    if terminal.is_json() {
         json::print(&output)
     } else {
         terminal.say(text.trim_end());

@@ -110,9 +110,6 @@ pub struct ConvergeArguments {
     /// --noise, and for another version of the program.
     #[arg(long)]
     force: bool,
-    /// Print converge.json on standard output instead of the table.
-    #[arg(long)]
-    json: bool,
 }
 
 fn translation_scale(text: &str) -> Result<TranslationScale, String> {
@@ -171,7 +168,7 @@ pub fn run(
         terminal,
     )?;
     record.write(&arguments.out.join(RUN_FILE), &[])?;
-    if arguments.json {
+    if terminal.is_json() {
         return json::print_text(&swept.json);
     }
     terminal.say(swept.result.to_string());
@@ -200,7 +197,7 @@ fn run_efficiency(
         terminal,
     )?;
     record.write(&arguments.out.join(RUN_FILE), &[])?;
-    if arguments.json {
+    if terminal.is_json() {
         return json::print(&table);
     }
     for row in &table {

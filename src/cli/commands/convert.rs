@@ -3,13 +3,14 @@
 use crate::camera::{ColmapCamera, UnknownModelError};
 use crate::cli::arguments::PosesArguments;
 use crate::cli::output::{
-    Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, record, refuse_overwriting,
-    survey_files,
+    Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, is_stream, json, record,
+    refuse_overwriting, refuse_two_results, survey_files,
 };
 use crate::files::printed;
 use crate::persist::atomic::{self, OutputSet, StagedFolder, WriteError};
 use crate::trajectory::{StampedPose, colmap, csv, kitti, nerfstudio, tum};
 use clap::ValueEnum;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Writes poses in another format, in the tunnel's frame and the convention of the format.
@@ -30,7 +31,8 @@ pub struct ConvertArguments {
     /// Format of the output.
     #[arg(long, value_enum, value_name = "FORMAT")]
     to: OutputFormat,
-    /// The file to write; for colmap a folder, created if missing.
+    /// The file to write; for colmap a folder, created if missing. `-` prints the poses on standard
+    /// output, without a record of the run.
     #[arg(long, short, value_name = "PATH")]
     out: PathBuf,
     #[command(flatten)]
@@ -63,6 +65,7 @@ pub fn run(
 ) -> Result<(), Failure> {
     let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
     let out = &arguments.out;
+    refuse_two_results(out, terminal)?;
     refuse_overwriting(std::slice::from_ref(out), survey_files(&survey))?;
     let inputs = record::hash_survey(&survey, arguments.poses.file())?;
     let has_names = !matches!(arguments.to, OutputFormat::Tum | OutputFormat::Kitti);
@@ -92,30 +95,40 @@ pub fn run(
             let keys = keys.map_err(|error| unknown_model(&error, "colmap"))?;
             nerfstudio::format(keys, &survey.frame_paths_from(folder), &trajectory)
         }
+        OutputFormat::Colmap if is_stream(out) => {
+            return Err(Failure::usage(
+                "--to colmap writes a folder, which cannot be printed; name one by --out",
+            ));
+        }
         OutputFormat::Colmap => {
             let mut outputs = OutputSet::default();
             outputs.folder(stage_colmap(out, &camera()?, &names(), &trajectory)?)?;
             record.add_to(&mut outputs, &out.join(RUN_FILE), &inputs)?;
             outputs.commit()?;
-            terminal.say(format!(
-                "wrote {} poses to {}",
-                trajectory.len(),
-                printed(out)
-            ));
-            return Ok(());
+            return print_result(out, trajectory.len(), terminal);
         }
     };
+    if is_stream(out) {
+        return json::print_text(&text);
+    }
     create_parent_folder(out)?;
     let mut outputs = OutputSet::default();
     outputs.write_text(out, &text)?;
     record.add_to(&mut outputs, &record::path_beside(out), &inputs)?;
     outputs.commit()?;
-    terminal.say(format!(
-        "wrote {} poses to {}",
-        trajectory.len(),
-        printed(out)
-    ));
-    Ok(())
+    print_result(out, trajectory.len(), terminal)
+}
+
+/// The result, for `--json`.
+#[derive(Serialize)]
+struct ConvertReport<'a> {
+    out: &'a Path,
+    poses: usize,
+}
+
+fn print_result(out: &Path, poses: usize, terminal: &Terminal) -> Result<(), Failure> {
+    terminal.say(format!("wrote {poses} poses to {}", printed(out)));
+    terminal.result(&ConvertReport { out, poses })
 }
 
 /// The failure of a format that cannot hold the camera's lens.

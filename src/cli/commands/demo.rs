@@ -42,9 +42,6 @@ pub struct DemoArguments {
     /// Random seed of wall, jitter and noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Print compare.json on standard output instead of the tables.
-    #[arg(long)]
-    json: bool,
 }
 
 /// Folders of the demo's steps.
@@ -65,11 +62,7 @@ pub fn run(
     terminal: &Arc<Terminal>,
 ) -> Result<(), Failure> {
     let since = Instant::now();
-    let say = |text: String| {
-        if !arguments.json {
-            terminal.say(text);
-        }
-    };
+    let say = |text: String| terminal.say(text);
     let folder = |name: &str| arguments.out.join(name);
     let folders = DemoFolders {
         survey: folder("survey"),
@@ -94,13 +87,13 @@ pub fn run(
         "\ntunnelstitch refine {survey_path} --out {refined_path}"
     ));
     let mut survey = Survey::open(&folders.survey)?;
-    let overlay = leave_out_overlay(&mut survey, arguments.json, terminal)?;
+    let overlay = leave_out_overlay(&mut survey, terminal)?;
     let options = RefineOptions::default();
     let out = &folders.refined;
     let (refined, _, outputs) =
         stage_refined(&survey, &overlay, &options, out, record, None, terminal)?;
     outputs.commit()?;
-    if !arguments.json {
+    if !terminal.is_json() {
         print_summary(&refined, terminal);
     }
 
@@ -111,7 +104,7 @@ pub fn run(
     ));
     let (comparison, json) = compare_and_report(&survey, &folders, record, terminal)?;
     record.write(&arguments.out.join(RUN_FILE), &[])?;
-    if arguments.json {
+    if terminal.is_json() {
         return json::print_text(&json);
     }
     let report_path = printed(&folders.report);

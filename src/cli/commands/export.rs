@@ -49,9 +49,6 @@ pub struct ExportArguments {
     /// browser; `view` keeps them in files.
     #[arg(long, value_name = "DIR", group = "output", help_heading = "Output")]
     web: Option<PathBuf>,
-    /// Print a description of the output as JSON.
-    #[arg(long, help_heading = "Output")]
-    json: bool,
     #[command(flatten)]
     layers: LayerArguments,
     #[command(flatten)]
@@ -122,7 +119,7 @@ pub fn run(
         chainage_m: canvas.map(|canvas| canvas.chainage_m()),
         layers,
     };
-    if arguments.json {
+    if terminal.is_json() {
         json::print(&report)
     } else {
         print_summary(&report, terminal);

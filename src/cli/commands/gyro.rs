@@ -4,7 +4,8 @@ use crate::cli::arguments::{
     FrameTimesArguments, MotionArguments, MountingArguments, clock_times, numbers, positive,
 };
 use crate::cli::output::{
-    Failure, RunRecord, Suggestion, SuggestionArguments, Terminal, create_parent_folder, record,
+    Failure, PosesReport, RunRecord, Suggestion, SuggestionArguments, Terminal,
+    create_parent_folder, record,
 };
 use crate::files::printed;
 use crate::persist::atomic::OutputSet;
@@ -15,6 +16,7 @@ use crate::trajectory::gyro::{
 };
 use crate::trajectory::{JitterModel, Rate, read_camera_in_body, tum};
 use nalgebra::{Matrix3, Vector3};
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Writes initial poses (TUM): rotations integrated from a gyroscope log (gcsv, to which Gyroflow
@@ -289,7 +291,31 @@ fn suggest_prior(
             .warn("the log states a rolling shutter that is read sideways, which is not supported"),
         None => {}
     }
-    suggestion.show(&arguments.suggestion, terminal)
+    suggestion.show(&arguments.suggestion, terminal)?;
+    terminal.result(&GyroReport {
+        poses: suggestion.report(&arguments.out, baseline.trajectory.len()),
+        samples: log.samples.len(),
+        rest_span_s: baseline.rest.as_ref().map(|rest| rest.span_s),
+        bias_deg_per_s: baseline.bias_rad_s.map(f64::to_degrees).into(),
+        time_offset_s: baseline.offset_s,
+        clock_correlation: baseline.clock.map(|clock| clock.correlation),
+        turned_deg: baseline.turned_rad.to_degrees(),
+        step_sigma_deg: baseline.step_sigma_rad.to_degrees(),
+    })
+}
+
+/// The result, for `--json`.
+#[derive(Serialize)]
+struct GyroReport<'a> {
+    #[serde(flatten)]
+    poses: PosesReport<'a>,
+    samples: usize,
+    rest_span_s: Option<[f64; 2]>,
+    bias_deg_per_s: [f64; 3],
+    time_offset_s: f64,
+    clock_correlation: Option<f64>,
+    turned_deg: f64,
+    step_sigma_deg: f64,
 }
 
 /// Prints rest, bias, clock and turn.

@@ -5,6 +5,7 @@ use crate::cli::output::{Failure, Terminal};
 use crate::files::printed;
 use crate::persist::atomic;
 use crate::survey::{Discovery, SURVEY_FILE, Survey};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Searches a folder for frames, calibration and poses, and writes a commented survey.toml for
@@ -55,11 +56,36 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
     }
     atomic::write_text(&path, &found.survey_toml(arguments.radius_m))?;
     terminal.say(format!("wrote {}", printed(&path)));
-    match Survey::open(folder) {
-        Ok(_) => terminal.say(format!("next: tunnelstitch check {}", printed(folder))),
-        Err(error) => terminal.warn(format!("not ready yet: {error}")),
+    let missing = Survey::open(folder).err().map(|error| error.to_string());
+    match &missing {
+        None => terminal.say(format!("next: tunnelstitch check {}", printed(folder))),
+        Some(missing) => terminal.warn(format!("not ready yet: {missing}")),
     }
-    Ok(())
+    let is_video = found.video.is_some();
+    terminal.result(&InitReport {
+        survey_file: &path,
+        images: (found.pictures.first().filter(|_| !is_video)).map(|group| group.pattern.as_str()),
+        video: found.video.as_ref().map(|video| video.path.as_path()),
+        mask: found.mask.as_deref(),
+        calibration: found.calibrations.first().map(|(path, _)| path.as_path()),
+        initial_poses: found.initial().map(|(path, _)| path.as_path()),
+        true_poses: found.truth().map(|(path, _)| path.as_path()),
+        missing,
+    })
+}
+
+/// The parts that were found, for `--json`; paths are relative to the folder.
+#[derive(Serialize)]
+struct InitReport<'a> {
+    survey_file: &'a Path,
+    images: Option<&'a str>,
+    video: Option<&'a Path>,
+    mask: Option<&'a Path>,
+    calibration: Option<&'a Path>,
+    initial_poses: Option<&'a Path>,
+    true_poses: Option<&'a Path>,
+    /// The error that keeps the survey from being used, if there is one.
+    missing: Option<String>,
 }
 
 /// Chooses a video as source of the frames if one is named or there are no pictures.

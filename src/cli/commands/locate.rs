@@ -76,10 +76,11 @@ pub struct LocateArguments {
     frame: Option<FramePixel>,
     /// Many pixels: a CSV file with the columns frame (name of its file, or its index from 0), u
     /// and v. They are copied to --out with the columns theta_rad, h_m and range_m (distance from
-    /// the camera) added, empty where the frame shows no wall.
+    /// the camera) added, empty where the frame shows no wall. `-` is
+    /// standard input.
     #[arg(long, group = "point", value_name = "IN.csv", requires = "out")]
     points: Option<PathBuf>,
-    /// The file to write for --points.
+    /// The file to write for --points; `-` is standard output.
     #[arg(long, short, value_name = "OUT.csv", requires = "points")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -95,9 +96,6 @@ pub struct LocateArguments {
         allow_hyphen_values = true
     )]
     twelve_at_deg: f64,
-    /// Print the answer as JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 /// A pixel of a frame.
@@ -223,7 +221,7 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
             })
             .collect(),
     };
-    if arguments.json {
+    if terminal.is_json() {
         return json::print(&located);
     }
     print_point(&located, survey.frames.len(), terminal);

@@ -1,13 +1,16 @@
 //! Wall points of many pixels of frames: the file that `locate --points` reads, and the one that it
 //! writes.
 
-use crate::cli::output::{Failure, Terminal};
+use crate::cli::output::{Failure, Terminal, is_stream, json, refuse_two_results};
 use crate::files::printed;
 use crate::persist::atomic;
 use crate::render::{hit_of_pixel, place_frames};
 use crate::survey::Survey;
 use crate::trajectory::Pose;
 use csv::StringRecord;
+use serde::Serialize;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// Columns of the input.
@@ -31,11 +34,17 @@ pub fn locate_points(
 ) -> Result<(), Failure> {
     let surface = survey.surface.as_ref();
     let placements = place_frames(surface, &survey.camera, poses, &survey.shutter())?;
-    let bad = |what: String| Failure::input(format!("{}: {what}", printed(points)));
-    let reader = csv::ReaderBuilder::new()
+    refuse_two_results(out, terminal)?;
+    let name = if is_stream(points) {
+        "standard input".to_owned()
+    } else {
+        printed(points).to_string()
+    };
+    let bad = |what: String| Failure::input(format!("{name}: {what}"));
+    let source = open_points(points).map_err(|error| bad(error.to_string()))?;
+    let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
-        .from_path(points);
-    let mut reader = reader.map_err(|error| bad(error.to_string()))?;
+        .from_reader(source);
     let headers = reader
         .headers()
         .map_err(|error| bad(error.to_string()))?
@@ -71,12 +80,37 @@ pub fn locate_points(
     let table = writer
         .into_inner()
         .map_err(|error| Failure::bug(error.to_string()))?;
-    atomic::write_text(out, &String::from_utf8_lossy(&table))?;
+    let table = String::from_utf8_lossy(&table);
+    if is_stream(out) {
+        return json::print_text(&table);
+    }
+    atomic::write_text(out, &table)?;
     terminal.say(format!(
         "wrote {}: {found} of {count} pixels show the wall",
         printed(out)
     ));
-    Ok(())
+    terminal.result(&PointsReport {
+        out,
+        pixels: count,
+        on_wall: found,
+    })
+}
+
+/// The result, for `--json`.
+#[derive(Serialize)]
+struct PointsReport<'a> {
+    out: &'a Path,
+    pixels: usize,
+    on_wall: usize,
+}
+
+/// Opens the file of pixels, or standard input.
+fn open_points(points: &Path) -> std::io::Result<Box<dyn Read>> {
+    Ok(if is_stream(points) {
+        Box::new(std::io::stdin())
+    } else {
+        Box::new(File::open(points)?)
+    })
 }
 
 /// Finds the columns of the input among its headers; returns what is missing.

@@ -141,5 +141,6 @@ pub fn run(
     suggestion.add_remark(
         "adapt it to your carrier, or give --rotation-sigma-deg and --translation-sigma-m.",
     );
-    suggestion.show(&arguments.suggestion, terminal)
+    suggestion.show(&arguments.suggestion, terminal)?;
+    terminal.result(&suggestion.report(&arguments.out, trajectory.len()))
 }

@@ -8,6 +8,7 @@ use crate::frames::{FrameFile, add_picture, load_colour, open_picture};
 use crate::persist::atomic::OutputSet;
 use crate::render::{Picture, cylinder};
 use image::ImageDecoder;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Projects one photo onto a cylinder around the camera.
@@ -67,7 +68,11 @@ pub fn run(
         None => described_camera(arguments)?,
     };
     let file = FrameFile::picture(0, arguments.image.clone());
-    let photo = Picture::from_decoded(load_colour(&file, camera.width, camera.height)?);
+    let decoded = load_colour(&file, camera.width, camera.height).map_err(|error| {
+        let image = printed(&arguments.image);
+        Failure::input(format!("{image}: {}", error.reason()))
+    })?;
+    let photo = Picture::from_decoded(decoded);
     let result = cylinder::project(&photo, &camera, arguments.interpolation.into());
     let mut outputs = OutputSet::default();
     add_picture(&mut outputs, &arguments.out, &result.image, format)?;
@@ -83,7 +88,22 @@ pub fn run(
         result.origin_px[0],
         result.origin_px[1]
     ));
-    Ok(())
+    terminal.result(&ProjectReport {
+        out: &arguments.out,
+        width: result.image.width(),
+        height: result.image.height(),
+        origin_px: result.origin_px,
+    })
+}
+
+/// The result, for `--json`.
+#[derive(Serialize)]
+struct ProjectReport<'a> {
+    out: &'a Path,
+    width: u32,
+    height: u32,
+    /// Coordinates û, v̂ of the first pixel on the cylinder, pixels.
+    origin_px: [i64; 2],
 }
 
 /// The pinhole camera that the arguments describe, for the size of the photo.

@@ -97,9 +97,6 @@ pub struct RefineArguments {
     /// exit code is 4 in any case.)
     #[arg(long, value_name = "SHARE", value_parser = share)]
     min_photometric: Option<f64>,
-    /// Print refine.json on standard output instead of the summary.
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     reading: PoseReadingArguments,
     #[command(flatten)]
@@ -190,17 +187,13 @@ pub fn run(
     let mut survey = (arguments.reading).open(&arguments.survey, points, terminal)?;
     let inputs = record::hash_survey(&survey, None)?;
     let origin = resume::origin(&survey, &options, inputs.clone())?;
-    let say = |text: &str| {
-        if !arguments.json {
-            terminal.say(text);
-        }
-    };
+    let say = |text: &str| terminal.say(text);
     check_memory(&survey)?;
     atomic::create_folder(&arguments.out)?;
     let result = arguments.out.join("refine");
     let (refined, json) = arguments.resume.run(&result, &origin, say, |checkpoint| {
         // After the check that the run to be continued is of the same frames.
-        let overlay = leave_out_overlay(&mut survey, arguments.json, terminal)?;
+        let overlay = leave_out_overlay(&mut survey, terminal)?;
         let (refined, json, mut outputs) = stage_refined(
             &survey,
             &overlay,
@@ -218,7 +211,7 @@ pub fn run(
     if 2 * count_flagged(&refined.report, FrameFlag::Prior) > survey.frames.len() {
         warn_of_reading(&survey, terminal)?;
     }
-    if arguments.json {
+    if terminal.is_json() {
         json::print_text(&json)?;
     } else {
         print_summary(&refined, terminal);
@@ -247,9 +240,7 @@ fn conclude(
             verdict.sentence
         )));
     }
-    if !arguments.json {
-        terminal.say(&verdict.sentence);
-    }
+    terminal.say(&verdict.sentence);
     Ok(())
 }
 

@@ -17,8 +17,8 @@ use crate::refine::{
 use crate::report::{OVERLAY_FILE, REFINEMENT_FILE, SECTIONS_FILE};
 use crate::surface::Bend;
 use crate::survey::{
-    FoundFiles, MASKED_FILE, MaskedWall, Overlay, OverlayReport, SURVEY_FILE, ShapeFile, Survey,
-    SurveyFile,
+    FoundFiles, MASKED_FILE, MaskedWall, Overlay, OverlayReport, SURVEY_FILE, ShapeFile,
+    SkippedFrame, Survey, SurveyFile,
 };
 use crate::trajectory::tum;
 use serde::Serialize;
@@ -43,6 +43,9 @@ struct RefineFile<'a> {
     survey_file: &'a SurveyFile,
     /// The effective options.
     options: &'a RefineOptions,
+    /// Frames that are left out because they cannot be read.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    skipped_frames: &'a [SkippedFrame],
     /// Pixels that do not move with the wall.
     overlay: &'a OverlayReport,
     #[serde(flatten)]
@@ -80,6 +83,7 @@ pub fn stage_refined(
         survey: &survey.folder,
         survey_file: &survey.file,
         options,
+        skipped_frames: &survey.skipped,
         overlay: &overlay.report,
         report: &refined.report,
     })?;

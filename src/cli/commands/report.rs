@@ -34,9 +34,6 @@ pub struct ReportArguments {
     /// [default: the frames' own resolution at the wall, less for long surveys].
     #[arg(long, value_name = "N", value_parser = positive)]
     px_per_metre: Option<f64>,
-    /// Print report.json on standard output instead of the summary.
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     reading: PoseReadingArguments,
 }
@@ -55,7 +52,7 @@ pub fn run(
             .reading
             .open_beside(&arguments.survey, &arguments.refined, terminal)?;
     let refined = RefinedFiles::read(&survey, &arguments.refined)?;
-    leave_out_overlay(&mut survey, arguments.json, terminal)?;
+    leave_out_overlay(&mut survey, terminal)?;
     let px_per_metre = match arguments.px_per_metre {
         Some(px_per_metre) => Some(px_per_metre),
         None => report::choose_resolution(&survey, &refined.poses)?,
@@ -79,7 +76,7 @@ pub fn run(
     let (report, json, mut outputs) = stage_report(sources, &arguments.out, terminal)?;
     record.add_to(&mut outputs, &arguments.out.join(RUN_FILE), &inputs)?;
     outputs.commit()?;
-    if arguments.json {
+    if terminal.is_json() {
         return json::print_text(&json);
     }
     for note in &report.notes {

@@ -4,7 +4,8 @@ use crate::cli::output::{Failure, Terminal, json};
 use crate::files::printed;
 use crate::persist::atomic::{self, WriteError};
 use clap_complete::Shell;
-use std::path::PathBuf;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
 
 /// Prints the completions of all commands and options for a shell.
 #[derive(Debug, clap::Args)]
@@ -70,5 +71,13 @@ pub fn write_manual(
         atomic::write_text(&path, &String::from_utf8_lossy(&text))?;
     }
     terminal.say(format!("wrote {}", printed(&arguments.out)));
-    Ok(())
+    terminal.result(&ManReport {
+        out: &arguments.out,
+    })
+}
+
+/// The result, for `--json`.
+#[derive(Serialize)]
+struct ManReport<'a> {
+    out: &'a Path,
 }

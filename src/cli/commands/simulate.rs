@@ -147,9 +147,6 @@ pub struct SimulateArguments {
     /// bytes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Print simulation.json on standard output.
-    #[arg(long)]
-    json: bool,
 }
 
 /// Names of experiments.
@@ -301,7 +298,7 @@ pub fn run(
     outputs.folder(folder)?;
     record.add_to(&mut outputs, &out.join(RUN_FILE), &inputs)?;
     outputs.commit()?;
-    if arguments.json {
+    if terminal.is_json() {
         return json::print(&simulated);
     }
     // Collecting the components drops a trailing slash.

@@ -51,9 +51,6 @@ pub struct StitchArguments {
     /// Treat every camera as if it stood on the tunnel's axis, to see the effect of its position.
     #[arg(long)]
     ignore_offset: bool,
-    /// Print a description of the panorama as JSON.
-    #[arg(long)]
-    json: bool,
     #[command(flatten)]
     resume: ResumeArguments,
 }
@@ -107,7 +104,7 @@ pub fn run(
     output.check_names()?;
     let (mut survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
     output.check_overwriting(&survey)?;
-    leave_out_overlay(&mut survey, arguments.json, terminal)?;
+    leave_out_overlay(&mut survey, terminal)?;
     let run = StitchRun {
         arguments,
         survey: &survey,
@@ -137,7 +134,7 @@ pub fn run(
     run.announce(&stitch, &budget);
     let inputs = record::hash_survey(&survey, arguments.poses.file())?;
     let origin = resume::origin(&survey, &run.options_of_result(), inputs.clone())?;
-    let say = |text: &str| run.say(text);
+    let say = |text: &str| terminal.say(text);
     arguments
         .resume
         .run(&output.out, &origin, say, |checkpoint| {
@@ -162,18 +159,11 @@ impl StitchArguments {
 }
 
 impl StitchRun<'_> {
-    /// Prints a line of the summary, unless JSON is printed.
-    fn say(&self, text: impl AsRef<str>) {
-        if !self.arguments.json {
-            self.terminal.say(text);
-        }
-    }
-
     /// Prints the size of the panorama and the memory that it takes.
     fn announce(&self, stitch: &Stitch, budget: &Budget) {
         let [width, height] = self.layout.size(stitch.canvas());
         let frames_bytes = stitch.frames().frame_bytes() * self.survey.frames.len() as u64;
-        self.say(format!(
+        self.terminal.say(format!(
             "{width} × {height} px; at most {} MiB of memory, {} of them for frames",
             budget.most(frames_bytes) >> 20,
             frames_bytes.min(budget.room) >> 20
@@ -256,7 +246,7 @@ impl StitchRun<'_> {
             exposure: plan.exposure().frames(),
             memory: budget,
         };
-        if self.arguments.json {
+        if terminal.is_json() {
             json::print(&report)
         } else {
             print_summary(&report, terminal);

@@ -10,6 +10,7 @@ use crate::inspect::{
 use crate::persist::atomic::ScratchFolder;
 use crate::report::REFINEMENT_FILE;
 use crate::survey::SURVEY_FILE;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Shows the tunnel in the browser: move along the wall, measure, mark defects, look at the frames
@@ -42,6 +43,10 @@ pub struct ViewArguments {
         help_heading = "Server"
     )]
     port: u16,
+    /// Also open the page in the system's browser. While the browser starts, other users of this
+    /// machine may see the address, with its token, among the running programs.
+    #[arg(long, help_heading = "Server")]
+    open: bool,
     #[command(flatten)]
     layers: LayerArguments,
     #[command(flatten)]
@@ -61,7 +66,7 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
             source_frames: None,
             marks: Marks::open(&arguments.survey)?,
         };
-        return serve(served, arguments.port);
+        return serve(served, arguments, terminal);
     }
     let (survey, poses) = match refined_folder(&arguments.survey)? {
         Some(refined) if arguments.poses.file().is_none() => refined,
@@ -86,7 +91,7 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
         source_frames: Some(pose_source_frames(survey, layers)?),
         marks,
     };
-    serve(served, arguments.port)
+    serve(served, arguments, terminal)
 }
 
 /// Finds the survey and the poses of a folder that `refine` has written; `None` for other folders.
@@ -115,11 +120,33 @@ fn refined_folder(folder: &Path) -> Result<Option<(PathBuf, PosesArguments)>, Fa
     }
 }
 
-fn serve(served: ServerContent, port: u16) -> Result<(), Failure> {
+/// The address of the page, for `--json`.
+#[derive(Serialize)]
+struct ViewReport<'a> {
+    address: &'a str,
+}
+
+fn serve(
+    served: ServerContent,
+    arguments: &ViewArguments,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
     let folder: &Path = &served.folder.clone();
-    let server = Server::listen(served, port)?;
+    let server = Server::listen(served, arguments.port)?;
+    let address: &str = &server.address();
     // Nobody and no program can find the server without this line.
-    json::print_text(&format!("{} (Ctrl-C ends it)\n", server.address()))?;
+    if terminal.is_json() {
+        json::print(&ViewReport { address })?;
+    } else {
+        json::print_text(&format!("{address} (Ctrl-C ends it)\n"))?;
+    }
+    if arguments.open
+        && let Err(error) = open::that_detached(address)
+    {
+        terminal.warn(format!(
+            "no browser was opened ({error}); open the printed address"
+        ));
+    }
     server.run();
     Err(Failure::bug(format!(
         "{}: the server has ended",

@@ -10,5 +10,5 @@ mod variables;
 #[cfg(test)]
 pub use option::EffectiveOption;
 pub use option::options_table;
-pub use parse::{options_of_command, parse};
+pub use parse::{asks_for_json, options_of_command, parse};
 pub use variables::{CONFIGURABLE, with_variables};

@@ -62,7 +62,7 @@ impl EffectiveOption {
 }
 
 /// True if a value of a switch in an environment variable means false, as clap reads it.
-fn is_false(value: &str) -> bool {
+pub(super) fn is_false(value: &str) -> bool {
     matches!(value, "" | "false" | "0" | "no" | "n" | "f" | "off")
 }
 

@@ -1,9 +1,9 @@
 //! Parses the command line together with the options of `survey.toml`.
 
-use super::option::{EffectiveOption, OptionSource, long_options};
+use super::option::{EffectiveOption, OptionSource, is_false, long_options};
 use super::survey_options::{SurveyOptions, read_survey_options};
 use super::variables::variable_name;
-use crate::cli::output::Failure;
+use crate::cli::output::{Failure, refused_arguments};
 use crate::files::printed;
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
@@ -25,7 +25,7 @@ pub struct Parsed {
 ///
 /// # Errors
 /// Wrong options in `survey.toml`. Wrong arguments and requests for help end the program as clap
-/// does.
+/// does, unless failures are printed as JSON.
 pub fn parse(command: &Command, arguments: Vec<OsString>) -> Result<Parsed, Failure> {
     let given = command.clone().try_get_matches_from(&arguments);
     let from_survey = match &given {
@@ -37,7 +37,10 @@ pub fn parse(command: &Command, arguments: Vec<OsString>) -> Result<Parsed, Fail
         Err(_) => None,
     };
     let (matches, survey_names) = match from_survey {
-        None => (given.unwrap_or_else(|error| error.exit()), Vec::new()),
+        None => (
+            given.map_err(|error| refused_arguments(&error))?,
+            Vec::new(),
+        ),
         Some(from_survey) => {
             let matches = parse_with_survey(command, arguments, &from_survey)?;
             (matches, from_survey.names)
@@ -57,6 +60,14 @@ pub fn parse(command: &Command, arguments: Vec<OsString>) -> Result<Parsed, Fail
     })
 }
 
+/// True if arguments that may be wrong, or the variable, ask for results and failures as JSON.
+pub fn asks_for_json(arguments: &[OsString]) -> bool {
+    let mut options = arguments.iter().take_while(|word| *word != "--");
+    let variable = std::env::var(variable_name(None, "json"));
+    options.any(|word| word == "--json")
+        || variable.is_ok_and(|value| !is_false(&value.to_lowercase()))
+}
+
 /// Parses the arguments with those of the survey behind them.
 fn parse_with_survey(
     command: &Command,
@@ -70,7 +81,7 @@ fn parse_with_survey(
     let matches = command.clone().try_get_matches_from(&arguments);
     matches.map_err(|error| {
         if error.kind() == ErrorKind::MissingRequiredArgument {
-            error.exit();
+            return refused_arguments(&error);
         }
         let text = error.to_string();
         let what = text.strip_prefix("error: ").unwrap_or(&text);

@@ -2,14 +2,19 @@
 //! record of a run beside its results.
 
 mod failure;
+mod failure_output;
 pub mod json;
+mod label;
 mod paths;
 pub mod record;
+mod stream;
 mod suggestion;
 mod terminal;
 
 pub use failure::Failure;
+pub use failure_output::{print_failure, print_failures_as_json, refused_arguments};
 pub use paths::{create_parent_folder, picture_format, refuse_overwriting, survey_files};
 pub use record::{RUN_FILE, RunRecord};
-pub use suggestion::{Suggestion, SuggestionArguments};
+pub use stream::{is_stream, refuse_two_results};
+pub use suggestion::{PosesReport, Suggestion, SuggestionArguments};
 pub use terminal::{Terminal, print_error};

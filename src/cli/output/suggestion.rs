@@ -26,6 +26,15 @@ pub struct Suggestion {
     remarks: Vec<String>,
 }
 
+/// Poses that were written, with the sections of `survey.toml` that they need.
+#[derive(Serialize)]
+pub struct PosesReport<'a> {
+    out: &'a Path,
+    poses: usize,
+    survey_file: &'a Suggestion,
+    remarks: &'a [String],
+}
+
 impl Suggestion {
     /// Suggests sections for poses in the file `out`; `survey` is the survey's folder or
     /// `survey.toml`.
@@ -45,6 +54,16 @@ impl Suggestion {
             poses: PosesSection::of(initial),
             prior,
             remarks: Vec::new(),
+        }
+    }
+
+    /// The poses that were written, with these sections, for `--json`.
+    pub fn report<'a>(&'a self, out: &'a Path, poses: usize) -> PosesReport<'a> {
+        PosesReport {
+            out,
+            poses,
+            survey_file: self,
+            remarks: &self.remarks,
         }
     }
 

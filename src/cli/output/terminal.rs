@@ -1,8 +1,12 @@
 //! Progress bars, summaries and warnings on the terminal.
 
+use super::failure::Failure;
+use super::json;
+use super::label::Label;
 use crate::files::escape_controls;
 use crate::progress::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
 use std::io::Write;
 use std::sync::Mutex;
 use std::time::Duration;
@@ -10,30 +14,62 @@ use std::time::Duration;
 /// Prints a line on standard error with its control characters escaped. A standard error that is
 /// closed or full is not an error, and never a panic.
 pub fn print_error(text: &str) {
-    // At once, so that lines of several threads do not mix.
-    let line = escape_controls(text) + "\n";
-    let _ = std::io::stderr().write_all(line.as_bytes());
+    write_line(escape_controls(text));
 }
 
-/// Progress bars on standard error (hidden with `--quiet` or if it is no terminal) and summaries on
-/// standard output.
+/// Prints a message as [`print_error`] does, behind its label. Further messages of the same label
+/// may follow on lines of their own.
+pub(super) fn print_labelled(label: Label, text: &str) {
+    let painted = label.painted();
+    let text =
+        escape_controls(text).replace(&format!("\n{}", label.word()), &format!("\n{painted}"));
+    write_line(format!("{painted} {text}"));
+}
+
+/// Writes a line at once, so that those of several threads do not mix.
+fn write_line(text: String) {
+    let _ = std::io::stderr().write_all((text + "\n").as_bytes());
+}
+
+/// Progress bars on standard error (hidden with `--quiet` or if it is no terminal) and, on standard
+/// output, summaries or (with `--json`) one JSON document instead.
 pub struct Terminal {
     quiet: bool,
+    is_json: bool,
     bar: Mutex<Option<ProgressBar>>,
 }
 
 impl Terminal {
-    /// Creates the terminal; `quiet` hides bars and summaries.
-    pub fn new(quiet: bool) -> Self {
+    /// Creates the terminal; `quiet` hides bars and summaries, `is_json` prints results as JSON
+    /// instead of summaries.
+    pub fn new(quiet: bool, is_json: bool) -> Self {
         Self {
             quiet,
+            is_json,
             bar: Mutex::new(None),
         }
     }
 
-    /// Prints a line of the summary.
+    /// True if the result is printed as JSON.
+    pub fn is_json(&self) -> bool {
+        self.is_json
+    }
+
+    /// Prints the result of the command as JSON, if it is asked for.
+    ///
+    /// # Errors
+    /// A standard output that is full.
+    pub fn result(&self, value: &impl Serialize) -> Result<(), Failure> {
+        if self.is_json {
+            json::print(value)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Prints a line of the summary, unless the result is printed as JSON.
     pub fn say(&self, text: impl AsRef<str>) {
-        if !self.quiet {
+        if !self.quiet && !self.is_json {
             // A closed pipe (`| head`) is not an error.
             let _ = writeln!(std::io::stdout(), "{}", escape_controls(text.as_ref()));
         }
@@ -41,7 +77,7 @@ impl Terminal {
 
     /// Prints a warning on standard error, even when quiet.
     pub fn warn(&self, text: impl AsRef<str>) {
-        print_error(&format!("warning: {}", text.as_ref()));
+        print_labelled(Label::Warning, text.as_ref());
     }
 
     fn with_bar(&self, act: impl FnOnce(&ProgressBar)) {

@@ -99,7 +99,7 @@ pub const JSON: &str = "Content-Type: application/json\r\n";
 pub fn mark(id: &str) -> String {
     format!(
         r#"{{"type":"Feature","id":"{id}",
-        "geometry":{{"type":"Point","coordinates":[1.5,2.0]}},
+        "geometry":{{"type":"Point","coordinates":[2.0,1.5]}},
         "properties":{{"class":"BAB","severity":3,"note":"","chainage_m":2.0,"clock":"4:30",
         "theta_deg":135.0,"x_m":1.0,"y_m":2.0,"z_m":0.0,"layer":"truth","created":""}}}}"#
     )

@@ -3,6 +3,7 @@
 use super::error::FrameError;
 use super::frame_file::{FrameFile, FrameSource};
 use super::picture_decoder::{Content, Input, decoder, open_picture};
+use super::picture_end::{is_jpeg, jpeg_is_complete, truncated, truncation};
 use super::picture_reading::PictureOrientation;
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, GrayImage, ImageDecoder, RgbImage};
@@ -22,6 +23,37 @@ impl FrameFile {
                 Ok(turned_size(header.dimensions(), turn))
             }
         }
+    }
+
+    /// Examines the start and the end of the file: a picture of this size, and all of it.
+    ///
+    /// # Errors
+    /// A missing, truncated or unknown file; a size other than `(width, height)`.
+    pub fn examine(&self, width: u32, height: u32) -> Result<(), FrameError> {
+        self.check_size(self.size()?, (width, height))?;
+        if !matches!(self.source, FrameSource::File(_)) {
+            return Ok(());
+        }
+        match truncation(&self.path) {
+            Ok(None) => Ok(()),
+            Ok(Some(what)) => Err(self.decode_error(what)),
+            Err(error) => Err(self.decode_error(error.to_string())),
+        }
+    }
+
+    /// Refuses another size than that of the calibration.
+    fn check_size(&self, found: (u32, u32), expected: (u32, u32)) -> Result<(), FrameError> {
+        if found == expected {
+            return Ok(());
+        }
+        Err(FrameError::Size {
+            index: self.index,
+            path: self.path.clone(),
+            width: found.0,
+            height: found.1,
+            expected_width: expected.0,
+            expected_height: expected.1,
+        })
     }
 
     /// The number of the EXIF orientation by which a picture file is to be turned or mirrored for
@@ -62,20 +94,7 @@ fn turned_size((width, height): (u32, u32), turn: Orientation) -> (u32, u32) {
 /// # Errors
 /// A missing, truncated or unknown file; a size other than `(width, height)`.
 pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicImage, FrameError> {
-    let check = |found: (u32, u32)| {
-        if found == (width, height) {
-            Ok(())
-        } else {
-            Err(FrameError::Size {
-                index: file.index,
-                path: file.path.clone(),
-                width: found.0,
-                height: found.1,
-                expected_width: width,
-                expected_height: height,
-            })
-        }
-    };
+    let check = |found| file.check_size(found, (width, height));
     let fail = |what: String| file.decode_error(what);
     let reading = match &file.source {
         FrameSource::Video(video, picture) => {
@@ -91,8 +110,8 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
     let content =
         Content::of(&file.path, width, height).map_err(|error| fail(error.to_string()))?;
     let bytes = content.as_ref();
-    if bytes.starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(bytes) {
-        return Err(fail("the JPEG file is truncated".to_owned()));
+    if is_jpeg(bytes) && !jpeg_is_complete(bytes) {
+        return Err(fail(truncated("JPEG")));
     }
     if reading.orientation == PictureOrientation::Stored
         && let Some(picture) = plain_tiff(content.input(), width, height)
@@ -148,13 +167,6 @@ pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
         FrameSource::Memory(picture) => Ok(picture.color()),
         FrameSource::File(_) => Ok(file.header()?.color_type()),
     }
-}
-
-/// True if a JPEG file contains its end-of-image marker; the decoder silently fills missing parts
-/// with grey. Padding after the marker is allowed.
-fn jpeg_is_complete(bytes: &[u8]) -> bool {
-    let end = bytes.len().saturating_sub(4096);
-    bytes[end..].windows(2).any(|pair| pair == [0xff, 0xd9])
 }
 
 #[cfg(test)]

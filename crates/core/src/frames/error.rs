@@ -24,10 +24,7 @@ pub enum FrameError {
         pattern: String,
     },
     /// A frame is unreadable or damaged.
-    #[error(
-        "frame {index} ({}): {what}; restore the file, or remove the frame and its pose",
-        printed(path)
-    )]
+    #[error("frame {index} ({}): {what}; {remedy}", printed(path))]
     Decode {
         /// Index of the frame in the survey.
         index: usize,
@@ -35,6 +32,8 @@ pub enum FrameError {
         path: PathBuf,
         /// The error of the decoder.
         what: String,
+        /// The remedy.
+        remedy: &'static str,
     },
     /// A video cannot be read.
     #[error("{}: {what}", printed(path))]
@@ -55,7 +54,8 @@ pub enum FrameError {
     /// A frame's size differs from the calibration's.
     #[error(
         "frame {index} ({}): {width} × {height} px, but the calibration is for {expected_width} × \
-         {expected_height} px",
+         {expected_height} px; give the calibration of these frames, or leave out what cannot be \
+         read by --skip-bad (skip_bad = true under [frames])",
         printed(path)
     )]
     Size {
@@ -72,4 +72,21 @@ pub enum FrameError {
         /// Height of the calibration.
         expected_height: u32,
     },
+}
+
+impl FrameError {
+    /// The reason of the failure, without the name of the frame and the remedy.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::Decode { what, .. } => what.clone(),
+            Self::Size {
+                width,
+                height,
+                expected_width,
+                expected_height,
+                ..
+            } => format!("{width} × {height} px, not {expected_width} × {expected_height} px"),
+            _ => self.to_string(),
+        }
+    }
 }

@@ -9,6 +9,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::files::printed;
 
+/// The remedy for a picture file that cannot be read.
+const RESTORE_OR_SKIP: &str = "restore the file, or leave out what cannot be read by --skip-bad \
+                               (skip_bad = true under [frames])";
+
 /// The place that a frame's pixels come from.
 #[derive(Clone, Debug)]
 pub(super) enum FrameSource {
@@ -95,6 +99,11 @@ impl FrameFile {
             index: self.index,
             path: self.path.clone(),
             what,
+            remedy: match &self.source {
+                FrameSource::File(_) => RESTORE_OR_SKIP,
+                FrameSource::Video(..) => "restore the file",
+                FrameSource::Memory(_) => "leave out the picture and its pose",
+            },
         }
     }
 

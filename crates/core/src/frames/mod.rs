@@ -13,6 +13,7 @@ mod local_normalisation;
 mod mask;
 mod noise;
 mod picture_decoder;
+mod picture_end;
 mod picture_reading;
 mod pyramid;
 mod shading;

@@ -4,8 +4,9 @@ use super::compression::Compression;
 use super::compression::Packed;
 use super::directory::{self, Directory, Values, tag};
 use super::error::RasterError;
+use super::geo_tags::{geo_tags, quantity_tag};
 use super::overviews::{LevelTile, OverviewBuilder, Waiting};
-use super::spec::{Georeference, Nodata, RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
+use super::spec::{Nodata, RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
 use super::spool::{Spool, Stored};
 use super::{deflate, jpeg};
 use crate::persist::atomic::{OutputSet, WriteError};
@@ -260,6 +261,9 @@ impl CogWriter {
         if let Some(georeference) = spec.georeference.filter(|_| level == 0) {
             tags.extend(geo_tags(&georeference));
         }
+        if let Some(quantity) = spec.quantity.filter(|_| level == 0) {
+            tags.push(quantity_tag(quantity));
+        }
         tags.sort_by_key(|&(number, _)| number);
         tags
     }
@@ -341,34 +345,6 @@ fn write_block(writer: &mut impl Write, block: &[u8]) -> io::Result<()> {
     writer.write_all(&(block.len() as u32).to_le_bytes())?;
     writer.write_all(block)?;
     writer.write_all(last)
-}
-
-/// The georeference: a plane in metres without a geographic coordinate system. The matrix supports
-/// axes of any direction.
-fn geo_tags(georeference: &Georeference) -> [(u16, Values); 2] {
-    let Georeference {
-        origin_m: [x, y],
-        step_m: [right, down],
-    } = *georeference;
-    #[rustfmt::skip]
-    let matrix = vec![
-        right, 0.0,  0.0, x,
-        0.0,   down, 0.0, y,
-        0.0,   0.0,  0.0, 0.0,
-        0.0,   0.0,  0.0, 1.0,
-    ];
-    #[rustfmt::skip]
-    let keys = vec![
-        1, 1, 0, 4, // version, revision, number of keys
-        1024, 0, 1, 1, // model type: projected
-        1025, 0, 1, 1, // raster type: pixel is area
-        3072, 0, 1, 32767, // projected system: user-defined
-        3076, 0, 1, 9001, // unit: metre
-    ];
-    [
-        (tag::MODEL_TRANSFORMATION, Values::Double(matrix)),
-        (tag::GEO_KEY_DIRECTORY, Values::Short(keys)),
-    ]
 }
 
 #[cfg(test)]

@@ -32,6 +32,7 @@
 //!     nodata: None,
 //!     reduce: Reduce::Mean,
 //!     georeference: None,
+//!     quantity: None,
 //! };
 //! let path = folder.path().join("wall.tif");
 //! let mut writer = CogWriter::begin(&path, spec, Compression::Deflate)?;
@@ -53,6 +54,7 @@ mod directory;
 mod downsample;
 mod dzi;
 mod error;
+mod geo_tags;
 mod jpeg;
 mod overviews;
 mod spec;
@@ -67,5 +69,6 @@ pub use error::RasterError;
 pub use jpeg::compress as compress_jpeg;
 pub use overviews::{LevelTile, OverviewBuilder};
 pub use spec::{
-    Georeference, Nodata, RasterSpec, RasterTile, Reduce, SampleType, TILE_EDGE_PX, TileOrder,
+    Georeference, Nodata, Quantity, RasterSpec, RasterTile, Reduce, SampleType, TILE_EDGE_PX,
+    TileOrder,
 };

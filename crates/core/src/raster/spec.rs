@@ -57,14 +57,29 @@ pub enum Nodata {
     Max,
 }
 
-/// The position of the picture in a plane in metres, aligned with its axes.
+/// The position of the picture in a plane in metres.
+///
+/// Programs show the plane with x to the right and y up. A picture is not mirrored there if a turn
+/// takes its columns and rows to these axes: the determinant of both steps is negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Georeference {
+    /// Name of the plane and of its axes, ASCII without `|`.
+    pub plane: &'static str,
     /// x and y of the upper left corner of the first pixel, metres.
     pub origin_m: [f64; 2],
-    /// Size of a pixel: the change of x per column to the right and of y per row down, metres;
-    /// negative for a decreasing coordinate.
-    pub step_m: [f64; 2],
+    /// Change of x and y from a column to the next one to the right, metres.
+    pub column_m: [f64; 2],
+    /// Change of x and y from a row to the next one below, metres.
+    pub row_m: [f64; 2],
+}
+
+/// The quantity that the samples of a raster of one channel are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quantity {
+    /// Its name, without characters that XML escapes.
+    pub name: &'static str,
+    /// Its unit, likewise; empty for plain numbers.
+    pub unit: &'static str,
 }
 
 /// The specification of a raster.
@@ -90,6 +105,8 @@ pub struct RasterSpec {
     pub reduce: Reduce,
     /// The georeference.
     pub georeference: Option<Georeference>,
+    /// The quantity, if the raster is none of brightness or colour.
+    pub quantity: Option<Quantity>,
 }
 
 /// A square of [`TILE_EDGE_PX`] × [`TILE_EDGE_PX`] pixels.

@@ -13,6 +13,7 @@ pub(super) fn grey_alpha(width: u32, height: u32) -> RasterSpec {
         nodata: None,
         reduce: Reduce::Mean,
         georeference: None,
+        quantity: None,
     }
 }
 

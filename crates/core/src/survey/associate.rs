@@ -1,6 +1,7 @@
 //! Association of poses with frames.
 
 use super::error::SurveyError;
+use super::skipped_frame::SkippedFrame;
 use crate::frames::FrameFile;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -33,16 +34,23 @@ pub(super) struct TimeAssociation {
 }
 
 /// Associates poses by order, in the convention of the file. The times are the file's, else the
-/// frames', else the indices.
+/// frames', else the indices. A file with poses of the `skipped` frames, too, is one of all frames.
 ///
 /// # Errors
 /// Different numbers of poses and frames.
 pub(super) fn by_order(
     file: &PoseFile,
     frames: &[FrameFile],
+    skipped: &[SkippedFrame],
     times_s: Option<&[f64]>,
 ) -> Result<Trajectory, SurveyError> {
-    if file.entries.len() != frames.len() {
+    let is_of_all = file.entries.len() == frames.len() + skipped.len();
+    let is_skipped = |k: usize| is_of_all && skipped.iter().any(|frame| frame.index == k);
+    let entries = file.entries.iter().enumerate();
+    let entries: Vec<&PoseEntry> = entries
+        .filter_map(|(k, entry)| (!is_skipped(k)).then_some(entry))
+        .collect();
+    if entries.len() != frames.len() {
         return Err(SurveyError::Count {
             path: file.path.clone(),
             poses: file.entries.len(),
@@ -56,9 +64,8 @@ pub(super) fn by_order(
             },
         });
     }
-    Ok(file
-        .entries
-        .iter()
+    Ok(entries
+        .into_iter()
         .enumerate()
         .map(|(k, entry)| stamped(entry, k, times_s))
         .collect())
@@ -321,12 +328,28 @@ mod tests {
 
     #[test]
     fn the_order_wants_as_many() {
-        let message = by_order(&file(&["a", "b"]), &frames(&["a"]), None)
+        let message = by_order(&file(&["a", "b"]), &frames(&["a"]), &[], None)
             .unwrap_err()
             .to_string();
         assert!(
             message.contains("2 poses for 1 frames") && message.contains("--associate name"),
             "{message}"
         );
+    }
+
+    #[test]
+    fn the_poses_of_skipped_frames_are_passed_over() {
+        let skipped = [SkippedFrame {
+            index: 1,
+            file: "b".to_owned(),
+            reason: String::new(),
+        }];
+        let two = frames(&["a", "c"]);
+        let times_s = |names: &[&str]| -> Vec<f64> {
+            let found = by_order(&file(names), &two, &skipped, None).unwrap();
+            found.iter().map(|stamped| stamped.time_s).collect()
+        };
+        assert_eq!(times_s(&["", "", ""]), [10.0, 12.0]);
+        assert_eq!(times_s(&["", ""]), [10.0, 11.0]);
     }
 }

@@ -112,6 +112,9 @@ pub struct FramesSection {
     /// calibration fits the turned ones only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation: Option<PictureOrientation>,
+    /// True to leave out picture files that cannot be read; they are an error by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skip_bad: Option<bool>,
     /// Use of pixels that do not move with the wall; they are left out by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub overlay: Option<OverlayUse>,
@@ -232,6 +235,7 @@ mod tests {
                 mask: Some("mask.png".into()),
                 bits: None,
                 orientation: None,
+                skip_bad: Some(true),
                 overlay: Some(OverlayUse::Keep),
             },
             poses: PosesSection {

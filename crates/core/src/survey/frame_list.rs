@@ -70,6 +70,12 @@ impl FrameList {
                     video: None,
                 }
             }
+            (None, Some(_), _) if section.skip_bad == Some(true) => {
+                return fail(
+                    "frames.skip_bad goes with frames.images; the pictures of a video cannot be \
+                     left out singly",
+                );
+            }
             (None, Some(_), _) if section.bits.is_some() || section.orientation.is_some() => {
                 return fail(
                     "frames.bits and frames.orientation go with frames.images; videos tell both \
@@ -111,11 +117,11 @@ impl FrameList {
     /// calibration; also the warning that they are, or that they are not although their EXIF data
     /// name an orientation. A section that says which is followed without a word.
     pub fn oriented(mut self, size: (u32, u32), section: &FramesSection) -> (Self, Option<String>) {
-        let first = self
-            .frames
-            .first()
-            .filter(|_| section.orientation.is_none());
         // A file that cannot be read is an error of its own.
+        let first = match section.orientation {
+            Some(_) => None,
+            None => self.frames.iter().find(|frame| frame.size().is_ok()),
+        };
         let named = first.and_then(|first| Some((first, first.exif_orientation().ok()??)));
         let Some((first, number)) = named else {
             return (self, None);

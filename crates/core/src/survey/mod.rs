@@ -26,6 +26,7 @@
 //! # angle_step_deg = 15.0     # keyframes by rotation of the view; needs associate = "time"
 //! times = "times.txt"         # optional: lines `time`, `time name` or `name time`
 //! mask = "mask.png"           # optional: an image, black where the wall is hidden
+//! skip_bad = true             # optional: leaves out files that cannot be read
 //! overlay = "keep"            # optional: also uses what does not move with the wall
 //!
 //! [poses]
@@ -82,6 +83,7 @@ mod error;
 mod file;
 mod frame_list;
 mod frame_paths;
+mod frame_skipping;
 mod frame_times;
 mod ignore;
 mod keyframe_selection;
@@ -97,6 +99,7 @@ mod pose_validation;
 mod poses_section;
 mod readout;
 mod shape_file;
+mod skipped_frame;
 mod template;
 mod tunnel;
 mod unposed_frames;
@@ -119,5 +122,6 @@ pub use overlay::{Overlay, OverlayReport};
 pub use pose_readings::PoseReading;
 pub use poses_section::PosesSection;
 pub use shape_file::ShapeFile;
+pub use skipped_frame::SkippedFrame;
 pub use tunnel::{DEFAULT_SHAPE_SIGMA_RADII, Shape, TunnelSection, read_centreline};
 pub use unposed_frames::UnposedFrames;

@@ -5,13 +5,19 @@ use super::error::SurveyError;
 use super::file::read_survey_file;
 use super::file::{SURVEY_FILE, SurveyFile};
 use super::frame_list::FrameList;
+use super::frame_skipping::skip_unreadable;
 use super::masked_wall::MaskedWall;
 use super::missing_poses::{self, MissingPoses, PoseGap};
+<<<<<<< HEAD
 use super::pose_conflicts;
 use super::pose_reader::PoseReader;
+=======
+use super::pose_reader::{FramesToPose, PoseReader};
+>>>>>>> wG
 use super::poses_section::PosesSection;
 use super::readout::readout_warning;
 use super::shape_file::ShapeFile;
+use super::skipped_frame::{self, SkippedFrame};
 use super::{ignore, pose_validation};
 use crate::frames::{FrameSet, Mask, Video};
 use std::path::{Path, PathBuf};
@@ -51,6 +57,8 @@ pub struct Survey {
     pub ignored: WallRegions,
     /// The frames, sorted by name, with their common mask.
     pub frames: FrameSet,
+    /// The frames that are left out because they cannot be read (`frames.skip_bad`).
+    pub skipped: Vec<SkippedFrame>,
     /// The initial poses, one per frame.
     pub initial: Trajectory,
     /// The frames that the file of the initial poses leaves out, and whose initial poses are
@@ -136,6 +144,10 @@ impl Survey {
         let listed = FrameList::new(&file.frames, &toml_path, &folder, None)?;
         let size = (camera.width, camera.height);
         let (listed, orientation_warning) = listed.oriented(size, &file.frames);
+        let (listed, skipped) = match file.frames.skip_bad {
+            Some(true) => skip_unreadable(listed, size)?,
+            _ => (listed, Vec::new()),
+        };
         let FrameList {
             frames,
             times_s,
@@ -159,6 +171,7 @@ impl Survey {
             radius_sigma,
             ignored,
             frames: FrameSet::new(frames, mask),
+            skipped,
             initial: Vec::new(),
             pose_gaps: Vec::new(),
             truth: None,
@@ -202,6 +215,7 @@ impl Survey {
         };
         warnings.extend(readout_warning(&survey.file.camera, &survey.folder));
         warnings.extend(orientation_warning);
+        warnings.extend(survey.skipped_sentence());
         warnings.extend(
             video
                 .iter()
@@ -247,8 +261,7 @@ impl Survey {
         surface: &dyn Surface,
         missing: MissingPoses,
     ) -> Result<ReadPoses, SurveyError> {
-        let times_s = self.times_s.as_deref();
-        let reader = PoseReader::new(section, &self.folder, &self.frames, times_s)?;
+        let reader = PoseReader::new(section, &self.folder, &self.frames_to_pose())?;
         let reading = reader.read(path, missing)?;
         let trajectory = reading.trajectory();
         let poses = poses_of(&trajectory);
@@ -267,6 +280,21 @@ impl Survey {
             gaps: reading.gaps,
             warnings,
         })
+    }
+
+    /// A sentence that names the frames that are left out because they cannot be read, if there are
+    /// any.
+    pub fn skipped_sentence(&self) -> Option<String> {
+        skipped_frame::sentence(&self.skipped, self.frames.len())
+    }
+
+    /// The frames that poses are read for.
+    pub(super) fn frames_to_pose(&self) -> FramesToPose<'_> {
+        FramesToPose {
+            frames: &self.frames,
+            skipped: &self.skipped,
+            times_s: self.times_s.as_deref(),
+        }
     }
 
     /// The files of the survey except the frames, even if others were read in their place.

@@ -6,6 +6,7 @@ use super::frame_times;
 use super::missing_poses::{self, MissingPoses, PoseGap};
 use super::pose_conflicts::{FrameConflict, frame_conflicts};
 use super::poses_section::PosesSection;
+use super::skipped_frame::SkippedFrame;
 use crate::frames::FrameFile;
 use std::borrow::Cow;
 use std::path::Path;
@@ -15,13 +16,23 @@ use tunnelstitch_geometry::trajectory::{
     read_poses_with, read_tunnel_frame,
 };
 
+/// The frames that poses are read for.
+#[derive(Clone, Copy)]
+pub(super) struct FramesToPose<'a> {
+    /// The frames.
+    pub frames: &'a [FrameFile],
+    /// Frames that are left out, and whose poses may be in a file.
+    pub skipped: &'a [SkippedFrame],
+    /// Times of the frames, seconds, if given by a file or a video.
+    pub times_s: Option<&'a [f64]>,
+}
+
 /// A reader of pose files with the options of a [`PosesSection`].
 pub(super) struct PoseReader<'a> {
     section: &'a PosesSection,
     camera_in_body: Option<Pose>,
     tunnel_in_world: Option<Pose>,
-    frames: &'a [FrameFile],
-    times_s: Option<&'a [f64]>,
+    frames: FramesToPose<'a>,
 }
 
 /// The poses of a file, one per frame, with their convention.
@@ -90,16 +101,14 @@ impl InterpretedPoses {
 }
 
 impl<'a> PoseReader<'a> {
-    /// Reads the files that the section names, relative to `folder`. `times_s`: the frames' times,
-    /// if given by a file.
+    /// Reads the files that the section names, relative to `folder`.
     ///
     /// # Errors
     /// A mount or a tunnel's frame that cannot be read.
     pub fn new(
         section: &'a PosesSection,
         folder: &Path,
-        frames: &'a [FrameFile],
-        times_s: Option<&'a [f64]>,
+        frames: &FramesToPose<'a>,
     ) -> Result<Self, SurveyError> {
         let mount = section.body_to_camera.as_ref();
         let tunnel = section.tunnel_frame.as_ref();
@@ -111,8 +120,7 @@ impl<'a> PoseReader<'a> {
             tunnel_in_world: tunnel
                 .map(|file| read_tunnel_frame(&folder.join(file)))
                 .transpose()?,
-            frames,
-            times_s,
+            frames: *frames,
         })
     }
 
@@ -143,7 +151,11 @@ impl<'a> PoseReader<'a> {
                     .to_owned(),
             });
         }
-        let (frames, times_s) = (self.frames, self.times_s);
+        let FramesToPose {
+            frames,
+            skipped,
+            times_s,
+        } = self.frames;
         let default = if file.has_names() {
             Associate::Name
         } else {
@@ -151,7 +163,7 @@ impl<'a> PoseReader<'a> {
         };
         let (mut gaps, mut conflicts) = (Vec::new(), Vec::new());
         let given = match self.section.associate.unwrap_or(default) {
-            Associate::Order => by_order(&file, frames, times_s)?,
+            Associate::Order => by_order(&file, frames, skipped, times_s)?,
             Associate::Name => {
                 let named = by_name(&file, frames, times_s)?;
                 let (given, left_out) =

@@ -62,8 +62,7 @@ impl Survey {
     /// The errors of [`Survey::open`], if the file has changed since.
     pub fn pose_readings(&self) -> Result<Vec<PoseReading>, SurveyError> {
         let section = &self.file.poses;
-        let times_s = self.times_s.as_deref();
-        let given = PoseReader::new(section, &self.folder, &self.frames, times_s)?
+        let given = PoseReader::new(section, &self.folder, &self.frames_to_pose())?
             .read(&self.folder.join(&section.initial), section.missing_poses())?;
         let surface = self.surface.as_ref();
         let as_given = PoseReading::of_poses(String::new(), 0, self.initial.clone());

@@ -9,7 +9,7 @@ use nalgebra::{Matrix2, Matrix6};
 use std::path::Path;
 use tunnelstitch_core::persist::atomic::OutputSet;
 use tunnelstitch_core::raster::{
-    CogWriter, Compression, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
+    CogWriter, Compression, Quantity, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
 };
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -132,7 +132,8 @@ impl Map {
         &self.values
     }
 
-    /// Adds the map to a set of outputs, as Cloud-Optimised GeoTIFF of single precision.
+    /// Adds the map of a quantity to a set of outputs, as Cloud-Optimised GeoTIFF of single
+    /// precision.
     ///
     /// # Errors
     /// As [`CogWriter`].
@@ -141,6 +142,7 @@ impl Map {
         outputs: &mut OutputSet,
         path: &Path,
         layout: Layout,
+        quantity: Quantity,
     ) -> Result<(), RasterError> {
         let [width, height] = layout.size(&self.grid);
         let spec = RasterSpec {
@@ -152,6 +154,7 @@ impl Map {
             nodata: None,
             reduce: Reduce::Mean,
             georeference: Some(georeference(&self.grid, layout)),
+            quantity: Some(quantity),
         };
         let mut writer = CogWriter::begin(path, spec, Compression::Deflate)?;
         let edge = tunnelstitch_core::raster::TILE_EDGE_PX as u32;

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use tunnelstitch_core::persist::atomic::{OutputSet, WriteError};
 use tunnelstitch_core::raster::{
     CogState, CogWriter, Compression, DziFormat, DziState, DziWriter, Georeference, Nodata,
-    RasterError, RasterSpec, RasterTile, Reduce, SampleType, TILE_EDGE_PX, TileOrder,
+    Quantity, RasterError, RasterSpec, RasterTile, Reduce, SampleType, TILE_EDGE_PX, TileOrder,
 };
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
@@ -230,6 +230,7 @@ fn spec(canvas: &Canvas, format: PixelFormat, layout: Layout, layer: RasterLayer
         nodata: None,
         reduce: Reduce::Mean,
         georeference: Some(georeference(canvas, layout)),
+        quantity: None,
     };
     match layer {
         RasterLayer::Panorama => RasterSpec {
@@ -242,8 +243,18 @@ fn spec(canvas: &Canvas, format: PixelFormat, layout: Layout, layer: RasterLayer
             alpha: true,
             ..plain
         },
-        RasterLayer::Coverage => plain,
+        RasterLayer::Coverage => RasterSpec {
+            quantity: Some(Quantity {
+                name: "255 where a frame shows the wall",
+                unit: "",
+            }),
+            ..plain
+        },
         RasterLayer::Frames => RasterSpec {
+            quantity: Some(Quantity {
+                name: "index of the frame shown",
+                unit: "",
+            }),
             samples: SampleType::U32,
             nodata: Some(Nodata::Max),
             reduce: Reduce::First,
@@ -252,18 +263,54 @@ fn spec(canvas: &Canvas, format: PixelFormat, layout: Layout, layer: RasterLayer
     }
 }
 
-/// Georeference of arc length and chainage in metres, along the axes of the layout.
+/// The plane of the unrolled wall: as seen from inside, with chainage to the right.
+const PLANE: &str = "Unrolled wall: x chainage, y arc length";
+
+/// Georeference of a picture in the plane of the unrolled wall, metres: x is the chainage, y the
+/// arc length. There, y up, the wall is as seen from inside in both layouts: writing is readable.
 pub(crate) fn georeference(canvas: &Canvas, layout: Layout) -> Georeference {
     let step_m = 1.0 / canvas.px_per_metre;
     let around_m = f64::from(canvas.columns) * step_m;
     match layout {
         Layout::ThetaRight => Georeference {
-            origin_m: [0.0, canvas.h_start_m],
-            step_m: [step_m, step_m],
+            plane: PLANE,
+            origin_m: [canvas.h_start_m, 0.0],
+            column_m: [0.0, step_m],
+            row_m: [step_m, 0.0],
         },
         Layout::ChainageRight => Georeference {
+            plane: PLANE,
             origin_m: [canvas.h_start_m, around_m],
-            step_m: [step_m, -step_m],
+            column_m: [step_m, 0.0],
+            row_m: [0.0, -step_m],
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pixel of either layout is at its chainage and arc length, and nothing is mirrored.
+    #[test]
+    fn both_layouts_lie_in_one_plane_that_is_not_mirrored() {
+        let canvas = Canvas {
+            columns: 8,
+            rows: 5,
+            px_per_metre: 4.0,
+            h_start_m: -1.5,
+        };
+        for layout in [Layout::ThetaRight, Layout::ChainageRight] {
+            let place = georeference(&canvas, layout);
+            let ([cx, cy], [rx, ry]) = (place.column_m, place.row_m);
+            assert!(cx * ry - cy * rx < 0.0, "{layout:?}");
+            let wall = canvas.wall(6, 3);
+            // The centre of a pixel is half a pixel beyond its corner.
+            let [u, v] = layout.to_picture(&canvas, [6.0, 3.0]).map(|k| k + 0.5);
+            let x_m = place.origin_m[0] + u * cx + v * rx;
+            let y_m = place.origin_m[1] + u * cy + v * ry;
+            assert!((x_m - wall.h_m).abs() < 1e-12, "{layout:?}");
+            assert!((y_m - wall.s_m).abs() < 1e-12, "{layout:?}");
+        }
     }
 }

@@ -40,7 +40,28 @@ export interface Remark {
 export function placesOf(mark: Mark): WallPlace[] {
   const { geometry } = mark;
   const all = geometry.type === "Point" ? [geometry.coordinates] : geometry.coordinates;
-  return all.map(([s, h]) => ({ s, h }));
+  return all.map(([h, s]) => ({ s, h }));
+}
+
+/** The mark with chainage before arc length; marks of version 0.1 have arc length first, which their chainages tell. */
+function chainageFirst(mark: Mark): Mark {
+  const { geometry, properties } = mark;
+  const all = geometry.type === "Point" ? [geometry.coordinates] : geometry.coordinates;
+  const chainages = [properties.chainage_m, properties.end_chainage_m];
+  const isAt = (axis: 0 | 1) =>
+    all.every((place, k) => {
+      const chainage = chainages[k];
+      return chainage === undefined || Math.abs(place[axis] - chainage) <= 1e-6;
+    });
+  if (isAt(0) || !isAt(1)) return mark;
+  const turned = ([s, h]: [number, number]): [number, number] => [h, s];
+  return {
+    ...mark,
+    geometry:
+      geometry.type === "Point"
+        ? { type: "Point", coordinates: turned(geometry.coordinates) }
+        : { type: "LineString", coordinates: [turned(geometry.coordinates[0]), turned(geometry.coordinates[1])] },
+  };
 }
 
 export function newMark(tunnel: Tunnel, wall: Wall, layer: string, places: WallPlace[], measure: Measure, remark: Remark): Mark {
@@ -52,8 +73,8 @@ export function newMark(tunnel: Tunnel, wall: Wall, layer: string, places: WallP
     type: "Feature",
     id: newId(),
     geometry: end
-      ? { type: "LineString", coordinates: [[first.s, first.h], [end.s, end.h]] }
-      : { type: "Point", coordinates: [first.s, first.h] },
+      ? { type: "LineString", coordinates: [[first.h, first.s], [end.h, end.s]] }
+      : { type: "Point", coordinates: [first.h, first.s] },
     properties: {
       ...remark,
       chainage_m: first.h,
@@ -114,7 +135,7 @@ export class LocalStore implements Store {
   private readonly key = `marks ${location.pathname}`;
 
   async all(): Promise<Mark[]> {
-    return JSON.parse(localStorage.getItem(this.key) ?? "[]") as Mark[];
+    return (JSON.parse(localStorage.getItem(this.key) ?? "[]") as Mark[]).map(chainageFirst);
   }
 
   async put(mark: Mark): Promise<void> {

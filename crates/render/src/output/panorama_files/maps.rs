@@ -16,7 +16,7 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use tunnelstitch_core::frames::{PictureFormat, add_picture};
 use tunnelstitch_core::persist::atomic::{OutputSet, WriteError};
-use tunnelstitch_core::raster::RasterError;
+use tunnelstitch_core::raster::{Quantity, RasterError};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::WallPoint;
 
@@ -114,16 +114,32 @@ impl MapFiles {
             wall.deformation.map(of_wall)
         };
         let masked = wall.masked.map(|at| Map::of_wall(&grid, at));
-        for (name, map) in [
-            (RESOLUTION, Some(resolution)),
-            (UNCERTAINTY, uncertainty),
-            (DEFORMATION, deformation(0)),
-            (DEFORMATION_SIGMA, deformation(1)),
-            (MASKED, masked),
+        for (file, map, name, unit) in [
+            (
+                RESOLUTION,
+                Some(resolution),
+                "wall per pixel of the frame",
+                "mm",
+            ),
+            (UNCERTAINTY, uncertainty, "1-sigma on the wall", "mm"),
+            (
+                DEFORMATION,
+                deformation(0),
+                "deviation outwards from the best-fit circle",
+                "mm",
+            ),
+            (
+                DEFORMATION_SIGMA,
+                deformation(1),
+                "1-sigma of the deviation",
+                "mm",
+            ),
+            (MASKED, masked, "share of the frames that were left out", ""),
         ] {
-            let path = self.folder.join(name);
+            let path = self.folder.join(file);
+            let quantity = Quantity { name, unit };
             match map {
-                Some(map) => map.add_to(outputs, &path, self.layout)?,
+                Some(map) => map.add_to(outputs, &path, self.layout, quantity)?,
                 None => outputs.remove(&path).map_err(RasterError::from)?,
             }
         }

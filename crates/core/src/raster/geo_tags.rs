@@ -1,0 +1,97 @@
+//! Tags of a GeoTIFF beside the picture: its place in a plane, and its quantity.
+//!
+//! Source: OGC GeoTIFF 1.1 (19-008r4), annex B; GDAL's metadata in TIFF files (tag 42112).
+
+use super::directory::{Values, tag};
+use super::spec::{Georeference, Quantity};
+
+/// "User-defined" as the value of a key.
+const USER_DEFINED: u16 = 32767;
+/// The code of the metre.
+const METRE: u16 = 9001;
+
+/// The georeference: a plane in metres with a name, neither geographic nor projected. The matrix
+/// supports axes of any direction.
+pub(super) fn geo_tags(georeference: &Georeference) -> [(u16, Values); 3] {
+    let Georeference {
+        plane,
+        origin_m: [x, y],
+        column_m: [column_x, column_y],
+        row_m: [row_x, row_y],
+    } = *georeference;
+    #[rustfmt::skip]
+    let matrix = vec![
+        column_x, row_x, 0.0, x,
+        column_y, row_y, 0.0, y,
+        0.0,      0.0,   0.0, 0.0,
+        0.0,      0.0,   0.0, 1.0,
+    ];
+    // Texts of keys end in `|`.
+    let citation = format!("{plane}|");
+    #[rustfmt::skip]
+    let keys = vec![
+        1, 1, 0, 4, // version, revision, number of keys
+        1024, 0, 1, USER_DEFINED, // model type
+        1025, 0, 1, 1, // raster type: pixel is area
+        1026, tag::GEO_ASCII_PARAMS, citation.len() as u16, 0, // name
+        3076, 0, 1, METRE, // unit
+    ];
+    [
+        (tag::MODEL_TRANSFORMATION, Values::Double(matrix)),
+        (tag::GEO_KEY_DIRECTORY, Values::Short(keys)),
+        (tag::GEO_ASCII_PARAMS, Values::Ascii(citation)),
+    ]
+}
+
+/// Name and unit of the first band, as GDAL reads them.
+pub(super) fn quantity_tag(quantity: Quantity) -> (u16, Values) {
+    let item = |name: &str, role: &str, text: &str| {
+        format!("  <Item name=\"{name}\" sample=\"0\" role=\"{role}\">{text}</Item>\n")
+    };
+    let mut items = item("DESCRIPTION", "description", quantity.name);
+    if !quantity.unit.is_empty() {
+        items += &item("UNITTYPE", "unittype", quantity.unit);
+    }
+    let text = format!("<GDALMetadata>\n{items}</GDALMetadata>\n");
+    (tag::GDAL_METADATA, Values::Ascii(text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turned_picture_has_its_steps_in_the_columns_of_the_matrix() {
+        let [matrix, keys, citation] = geo_tags(&Georeference {
+            plane: "plane",
+            origin_m: [10.0, 20.0],
+            column_m: [0.0, 0.5],
+            row_m: [0.25, 0.0],
+        });
+        let (tag::MODEL_TRANSFORMATION, Values::Double(matrix)) = matrix else {
+            panic!("{matrix:?}");
+        };
+        assert_eq!(matrix[..8], [0.0, 0.25, 0.0, 10.0, 0.5, 0.0, 0.0, 20.0]);
+        assert_eq!(citation.1, Values::Ascii("plane|".to_owned()));
+        let Values::Short(keys) = keys.1 else {
+            panic!("{keys:?}");
+        };
+        assert_eq!(keys.len(), 4 * (1 + usize::from(keys[3])));
+        assert_eq!(keys[12..16], [1026, 34737, 6, 0]);
+    }
+
+    #[test]
+    fn plain_numbers_have_no_unit() {
+        let text = |unit| match quantity_tag(Quantity {
+            name: "share",
+            unit,
+        })
+        .1
+        {
+            Values::Ascii(text) => text,
+            other => panic!("{other:?}"),
+        };
+        assert!(text("mm").contains("role=\"unittype\">mm</Item>"));
+        assert!(!text("").contains("UNITTYPE") && text("").contains(">share</Item>"));
+    }
+}
