@@ -145,7 +145,7 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
 /// Deviations of the second frames from their prior, `½ eᵀΣ⁻¹e`; None where a frame does not fit.
 type Registrations = Vec<Option<f64>>;
 
-/// What a reading is compared with.
+/// The reading given, with which others are compared.
 struct Comparison {
     /// The pairs in the reading given.
     given: Registrations,

@@ -474,11 +474,12 @@ pub fn print_summary(refined: &Refined, terminal: &Terminal) {
     }
 }
 
-/// What may have kept all frames from being photometric.
+/// Possible causes where no frame is photometric.
 fn explain_failure(report: &RefineReport) -> &'static str {
     if 2 * count_flagged(report, FrameFlag::Ambiguous) > report.frames.len() {
-        "  no frame is photometric: the wall repeats itself, and the initial poses are too uncertain \
-         to tell its repetitions apart; more exact ones, with a smaller σ under [prior], do"
+        "  no frame is photometric: the wall repeats itself, and the initial poses are too \
+         uncertain to tell its repetitions apart; more exact ones, with a smaller σ under \
+         [prior], do"
     } else {
         "  no frame is photometric; possible causes: too few overlapping frames, a wall without \
          texture, poses in another convention (--pose-convention, --camera-axes, --tunnel-frame), \

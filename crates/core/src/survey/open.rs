@@ -8,12 +8,8 @@ use super::frame_list::FrameList;
 use super::frame_skipping::skip_unreadable;
 use super::masked_wall::MaskedWall;
 use super::missing_poses::{self, MissingPoses, PoseGap};
-<<<<<<< HEAD
 use super::pose_conflicts;
-use super::pose_reader::PoseReader;
-=======
 use super::pose_reader::{FramesToPose, PoseReader};
->>>>>>> wG
 use super::poses_section::PosesSection;
 use super::readout::readout_warning;
 use super::shape_file::ShapeFile;

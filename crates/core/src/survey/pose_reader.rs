@@ -220,11 +220,12 @@ impl<'a> PoseReader<'a> {
             tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
             interpolate: self.section.interpolate.unwrap_or(false),
         };
-        let times_s = match self.times_s {
+        let frames = self.frames.frames;
+        let times_s = match self.frames.times_s {
             Some(times_s) => Cow::Borrowed(times_s),
-            None => Cow::Owned(frame_times::from_names(self.frames)?),
+            None => Cow::Owned(frame_times::from_names(frames)?),
         };
-        let given = by_time(file, self.frames, &times_s, how)?;
+        let given = by_time(file, frames, &times_s, how)?;
         let unit_m = self.section.unit_m.unwrap_or(1.0);
         Ok((given, frame_conflicts(file, &times_s, how, unit_m)))
     }
