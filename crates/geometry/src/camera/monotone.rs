@@ -54,23 +54,23 @@ pub fn invert_monotone(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> 
     for _ in 0..MAX_INVERSION_ITERATIONS {
         let (value, slope) = f(x);
         let error = value - target;
+        let newton = x - error / slope;
+        // Before the bracket is looked at: next to the root, rounding may put it on its end.
+        if (newton - x).abs() <= 1e-15 * x {
+            return Some(newton.min(end));
+        }
         if error > 0.0 {
             high = x;
         } else {
             low = x;
         }
-        let newton = x - error / slope;
-        let next = if newton > low && newton < high {
+        x = if newton > low && newton < high {
             newton
         } else if high.is_finite() {
             0.5 * (low + high)
         } else {
             2.0 * x
         };
-        if (next - x).abs() <= 1e-15 * x {
-            return Some(next);
-        }
-        x = next;
     }
     let is_root = |x: f64| (f(x).0 - target).abs() <= 1e-12 * target;
     // The last bit alternates.
@@ -91,6 +91,7 @@ pub fn invert_monotone(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::cell::Cell;
 
     #[test]
     fn the_end_is_where_the_slope_vanishes() {
@@ -115,6 +116,16 @@ mod tests {
             assert!((back - x).abs() < 1e-8, "{x}: {back}");
         }
         assert!(invert_monotone(f, 0.4, end).is_none());
+        // Newton's method lands on the root itself, and stays there.
+        let evaluations = Cell::new(0);
+        let counted = |x: f64| {
+            evaluations.set(evaluations.get() + 1);
+            f(x)
+        };
+        for k in 1..100 {
+            invert_monotone(counted, f(0.005 * f64::from(k)).0, end).unwrap();
+        }
+        assert!(evaluations.get() < 800, "{}", evaluations.get());
         assert!(invert_monotone(f, f64::NAN, end).is_none());
         // Newton's method goes in a circle of two within the bracket.
         let wavy = |x: f64| (x + 0.99 * (x - 2.0).sin() + 0.99 * 2f64.sin(), 1.0);
