@@ -26,10 +26,8 @@ REFINE = "crates/refine/src/"
 # Name of the technique, file, text, and what takes its place.
 EDITS = [
     ("correlation search", "tracking/registration.rs",
-     "registration.search(&predicted.pose, registration.sigma_rad, MAX_HYPOTHESES)",
-     "vec![Hypothesis { pose: predicted.pose, score: 0.0, attainable_score: 0.0 }]"),
-    ("closer searches", "tracking/registration.rs",
-     "registration.search_closer(&mut candidates, effort)?;", ""),
+     "let hypotheses = registration.search();",
+     "let hypotheses = [Hypothesis { pose: predicted.pose, score: 0.0, attainable_score: 0.0 }];"),
     ("sliding windows", "tracking/track.rs", "if k > 0 {", "if false {"),
     ("long windows", "tracking/track.rs", "if k.is_multiple_of(LONG_WINDOW_STRIDE) {", "if false {"),
     ("windows from the coarsest level", "tracking/windows.rs", "if !drifted {", "if true {"),
