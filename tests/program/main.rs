@@ -3,6 +3,7 @@
 mod as_built;
 mod bad_input;
 mod broken_inputs;
+mod browser;
 mod calibrate;
 mod check;
 mod colmap;
