@@ -32,6 +32,9 @@ const MIN_PAIRS: usize = 4;
 /// Pairs that are registered at once; after each batch a reading that cannot be taken any more is
 /// given up.
 const BATCH: usize = 4;
+/// Hypotheses of a frame's pose that are refined: neighbours at the right reading overlap by much,
+/// so that the right one is among the best.
+const MAX_HYPOTHESES: usize = 2;
 /// Evidence below that of the best reading with which another is named beside it, nats: odds of one
 /// to twenty.
 const MAX_DEFICIT_NATS: f64 = 3.0;
@@ -274,7 +277,7 @@ fn register_pairs(
             frame,
             &predicted,
             &neighbours,
-            &mut Effort::default(),
+            &mut Effort::of(MAX_HYPOTHESES),
         )?;
         Ok(registered.ok().map(|registered| registered.deviation))
     };

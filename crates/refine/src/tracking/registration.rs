@@ -63,6 +63,11 @@ pub struct Effort {
 }
 
 impl Effort {
+    /// The effort of refining so many hypotheses.
+    pub fn of(hypotheses: usize) -> Self {
+        Self { left: hypotheses }
+    }
+
     /// Adds the share of one frame.
     pub fn grant(&mut self) {
         self.left += MEAN_HYPOTHESES;
@@ -96,7 +101,6 @@ pub fn register_frame(
     };
     let registration =
         Registration::new(context, options, frame, predicted, neighbours, distance_m)?;
-    effort.grant();
     let hypotheses = registration.search();
     let mut candidates = registration.refine_hypotheses(&hypotheses, effort)?;
     sort_candidates(&mut candidates);

@@ -160,6 +160,7 @@ impl Tracking {
             frame_range,
         };
         self.attempts += 1;
+        self.effort.grant();
         match register_frame(
             context,
             options,
@@ -225,6 +226,7 @@ pub fn register_rejected(
             footprints: &footprints[frame_range.clone()],
             frame_range,
         };
+        effort.grant();
         let result = register_frame(context, options, k, &predicted, &neighbours, &mut effort)?;
         states.estimates[k] = match result {
             Ok(registered) => {
