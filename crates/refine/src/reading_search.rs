@@ -31,10 +31,10 @@ const MAX_PAIRS: usize = 12;
 const MIN_PAIRS: usize = 4;
 /// Pairs that are registered at once; after each batch a reading that cannot be taken any more is
 /// given up.
-const BATCH: usize = 4;
+const PAIRS_AT_ONCE: usize = 4;
 /// Hypotheses of a frame's pose that are refined: neighbours at the right reading overlap by much,
 /// so that the right one is among the best.
-const MAX_HYPOTHESES: usize = 2;
+const MAX_PAIR_HYPOTHESES: usize = 2;
 /// Evidence below that of the best reading with which another is named beside it, nats: odds of one
 /// to twenty.
 const MAX_DEFICIT_NATS: f64 = 3.0;
@@ -117,7 +117,7 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
         return Ok(None);
     };
     let comparison = Comparison {
-        given: pictures.register(survey, &given, |_| true)?,
+        of_given: pictures.register(survey, &given, |_| true)?,
         least_nats,
     };
     let mut found = Vec::new();
@@ -139,7 +139,7 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
     Ok(Some(FittingReadings {
         readings: named.map(|(_, _, reading)| reading.remedy).collect(),
         fitting,
-        given: comparison.given.iter().flatten().count(),
+        given: comparison.of_given.iter().flatten().count(),
         pairs: firsts.len(),
         log_odds,
     }))
@@ -151,7 +151,7 @@ type Registrations = Vec<Option<f64>>;
 /// The reading given, with which others are compared.
 struct Comparison {
     /// The pairs in the reading given.
-    given: Registrations,
+    of_given: Registrations,
     /// Natural logarithm of the odds that a reading must exceed.
     least_nats: f64,
 }
@@ -161,7 +161,7 @@ impl Comparison {
     /// fit deviates by as much as the prior allows.
     fn evidence(&self, reading: &[Option<f64>]) -> Vec<f64> {
         let deviation = |registered: &Option<f64>| registered.unwrap_or(MAX_DEVIATION_COST);
-        let pairs = reading.iter().zip(&self.given);
+        let pairs = reading.iter().zip(&self.of_given);
         pairs
             .map(|(reading, given)| deviation(given) - deviation(reading))
             .collect()
@@ -170,7 +170,7 @@ impl Comparison {
     /// True if a reading is taken whose first pairs are `reading` and in which all others fit
     /// without any deviation.
     fn may_take(&self, reading: &[Option<f64>]) -> bool {
-        let at_best = vec![Some(0.0); self.given.len() - reading.len()];
+        let at_best = vec![Some(0.0); self.of_given.len() - reading.len()];
         let pairs = [reading, &at_best].concat();
         let evidence = self.evidence(&pairs);
         let fitting = pairs.iter().flatten().count();
@@ -277,13 +277,13 @@ fn register_pairs(
             frame,
             &predicted,
             &neighbours,
-            &mut Effort::of(MAX_HYPOTHESES),
+            &mut Effort::of(MAX_PAIR_HYPOTHESES),
         )?;
         Ok(registered.ok().map(|registered| registered.deviation))
     };
     let pairs: Vec<usize> = (0..setup.count() / 2).collect();
     let mut registered = Vec::new();
-    for batch in pairs.chunks(BATCH) {
+    for batch in pairs.chunks(PAIRS_AT_ONCE) {
         if !is_wanted(&registered) {
             break;
         }
@@ -312,7 +312,7 @@ mod tests {
     #[test]
     fn a_reading_is_given_up_once_the_other_pairs_cannot_save_it() {
         let comparison = Comparison {
-            given: vec![Some(3.0); 12],
+            of_given: vec![Some(3.0); 12],
             least_nats: 9.5,
         };
         assert!(comparison.may_take(&[]));

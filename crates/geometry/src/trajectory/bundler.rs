@@ -57,11 +57,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         let Some(pose) = pose else { continue };
         seen.add(&name)
             .map_err(|what| PoseError::file(&list, what))?;
-        entries.push(PoseEntry {
-            name: Some(name),
-            time_s: None,
-            pose,
-        });
+        entries.push(PoseEntry::named(name, pose));
     }
     Ok(entries)
 }

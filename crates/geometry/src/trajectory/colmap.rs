@@ -70,14 +70,13 @@ fn parse_line(line: &str) -> Result<PoseEntry, String> {
         *value = text::number(word, FORM)?;
     }
     let [qw, qx, qy, qz, tx, ty, tz] = values;
-    Ok(PoseEntry {
-        name: Some(name.join(" ")),
-        time_s: None,
-        pose: Pose::new(
+    Ok(PoseEntry::named(
+        name.join(" "),
+        Pose::new(
             text::rotation([qw, qx, qy, qz], "QW QX QY QZ")?,
             Vector3::new(tx, ty, tz),
         ),
-    })
+    ))
 }
 
 /// Checks that a line holds points or is empty.

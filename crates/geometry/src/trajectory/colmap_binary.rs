@@ -107,14 +107,13 @@ impl ImageRecord {
         if self.name.is_empty() {
             return Err("there is no name, and so no frame for the pose".to_owned());
         }
-        Ok(PoseEntry {
-            name: Some(self.name.clone()),
-            time_s: None,
-            pose: Pose::new(
+        Ok(PoseEntry::named(
+            self.name.clone(),
+            Pose::new(
                 text::rotation(self.quaternion, "qw qx qy qz")?,
                 Vector3::from(self.translation),
             ),
-        })
+        ))
     }
 }
 

@@ -18,6 +18,14 @@ fn read_text(text: &str) -> Result<PoseFile, PoseError> {
     read_poses(&file_of(text.as_bytes()).1, None)
 }
 
+/// The poses of a file of this name and text, or the message of its error.
+pub(super) fn read_named(name: &str, text: &str) -> Result<PoseFile, String> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join(name);
+    std::fs::write(&path, text).unwrap();
+    read_poses(&path, None).map_err(|error| error.to_string())
+}
+
 fn names(count: usize) -> Vec<String> {
     (0..count)
         .map(|k| format!("frames/a,\"{k}\".png"))

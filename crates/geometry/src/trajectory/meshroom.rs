@@ -72,11 +72,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         };
         names.add(&view.path).map_err(of_view)?;
         let pose = transform.world_to_camera().map_err(of_view)?;
-        entries.push(PoseEntry {
-            name: Some(view.path),
-            time_s: None,
-            pose,
-        });
+        entries.push(PoseEntry::named(view.path, pose));
     }
     Ok(entries)
 }
@@ -104,14 +100,12 @@ fn numbers<const N: usize>(list: &[Value; N], name: &str) -> Result<[f64; N], St
 
 #[cfg(test)]
 mod tests {
-    use crate::trajectory::{Convention, PoseFile, PoseFormat, read_poses};
+    use crate::trajectory::format_tests::read_named;
+    use crate::trajectory::{Convention, PoseFile, PoseFormat};
     use nalgebra::Vector3;
 
     fn read(text: &str) -> Result<PoseFile, String> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("cameras.sfm");
-        std::fs::write(&path, text).unwrap();
-        read_poses(&path, None).map_err(|error| error.to_string())
+        read_named("cameras.sfm", text)
     }
 
     /// The rows of R, world-to-camera, are x, y and z of the camera in the world: x towards −y, y

@@ -49,11 +49,10 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         if placement.is_none() {
             unplaced.insert(component);
         }
-        entries.push(PoseEntry {
-            name: Some(name.to_owned()),
-            time_s: None,
-            pose: placement.map_or(pose, |placement| placement.after(&pose)),
-        });
+        entries.push(PoseEntry::named(
+            name,
+            placement.map_or(pose, |placement| placement.after(&pose)),
+        ));
     }
     if unplaced.len() > 1 {
         return Err(fail(format!(
@@ -132,14 +131,12 @@ impl<'a> World<'a> {
 
 #[cfg(test)]
 mod tests {
-    use crate::trajectory::{Convention, PoseFile, PoseFormat, read_poses};
+    use crate::trajectory::format_tests::read_named;
+    use crate::trajectory::{Convention, PoseFile, PoseFormat};
     use nalgebra::Vector3;
 
     fn read(text: &str) -> Result<PoseFile, String> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("cameras.xml");
-        std::fs::write(&path, text).unwrap();
-        read_poses(&path, None).map_err(|error| error.to_string())
+        read_named("cameras.xml", text)
     }
 
     /// x of the camera towards the chunk's −y, y towards −z, z along x.

@@ -51,11 +51,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         names.add(&frame.file_path).map_err(of_frame)?;
         let pose = rigid::from_rows(&frame.transform_matrix)
             .map_err(|what| of_frame(format!("transform_matrix: {what}")))?;
-        entries.push(PoseEntry {
-            name: Some(frame.file_path),
-            time_s: None,
-            pose: applied.after(&pose),
-        });
+        entries.push(PoseEntry::named(frame.file_path, applied.after(&pose)));
     }
     Ok(entries)
 }

@@ -68,11 +68,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         let of_view = |what: String| fail(format!("view {name}: {what}"));
         names.add(&name).map_err(of_view)?;
         let pose = placed.world_to_camera().map_err(of_view)?;
-        entries.push(PoseEntry {
-            name: Some(name),
-            time_s: None,
-            pose,
-        });
+        entries.push(PoseEntry::named(name, pose));
     }
     Ok(entries)
 }
@@ -89,14 +85,12 @@ impl Placed {
 
 #[cfg(test)]
 mod tests {
-    use crate::trajectory::{Convention, PoseFile, PoseFormat, read_poses};
+    use crate::trajectory::format_tests::read_named;
+    use crate::trajectory::{Convention, PoseFile, PoseFormat};
     use nalgebra::Vector3;
 
     fn read(text: &str) -> Result<PoseFile, String> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("sfm_data.json");
-        std::fs::write(&path, text).unwrap();
-        read_poses(&path, None).map_err(|error| error.to_string())
+        read_named("sfm_data.json", text)
     }
 
     /// A file with a view that has a pose and one that has none (the largest number for none).

@@ -50,26 +50,20 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
                     "shot {name}: its rotation is no rotation vector in radians"
                 )));
             }
-            Ok(PoseEntry {
-                name: Some(name),
-                time_s: None,
-                pose,
-            })
+            Ok(PoseEntry::named(name, pose))
         })
         .collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::trajectory::{Convention, PoseFormat, read_poses};
+    use crate::trajectory::format_tests::read_named;
+    use crate::trajectory::{Convention, PoseFile, PoseFormat};
     use nalgebra::Vector3;
     use std::f64::consts::FRAC_PI_2;
 
-    fn read(text: &str) -> Result<crate::trajectory::PoseFile, String> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("reconstruction.json");
-        std::fs::write(&path, text).unwrap();
-        read_poses(&path, None).map_err(|error| error.to_string())
+    fn read(text: &str) -> Result<PoseFile, String> {
+        read_named("reconstruction.json", text)
     }
 
     /// A camera at (1, 2, 3) that looks along the world's x, x of the picture towards −z: a quarter

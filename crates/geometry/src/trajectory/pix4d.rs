@@ -54,11 +54,10 @@ fn camera(line: &str) -> Result<PoseEntry, String> {
         *value = text::number(word, FORM)?;
     }
     let [x, y, z, omega, phi, kappa] = values;
-    Ok(PoseEntry {
-        name: Some(name.join(" ")),
-        time_s: None,
-        pose: Pose::new(rotation([omega, phi, kappa]), Vector3::new(x, y, z)),
-    })
+    Ok(PoseEntry::named(
+        name.join(" "),
+        Pose::new(rotation([omega, phi, kappa]), Vector3::new(x, y, z)),
+    ))
 }
 
 /// The rotation from the camera, in OpenGL's axes, to the world; angles in degrees.
@@ -73,13 +72,11 @@ fn rotation(angles_deg: [f64; 3]) -> UnitQuaternion<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::{Convention, PoseFile, PoseFormat, read_poses};
+    use crate::trajectory::format_tests::read_named;
+    use crate::trajectory::{Convention, PoseFile, PoseFormat};
 
     fn read(text: &str) -> Result<PoseFile, String> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("external.txt");
-        std::fs::write(&path, text).unwrap();
-        read_poses(&path, None).map_err(|error| error.to_string())
+        read_named("external.txt", text)
     }
 
     /// The elements of R as textbooks write them out.

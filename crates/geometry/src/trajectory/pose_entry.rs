@@ -12,3 +12,14 @@ pub struct PoseEntry {
     /// The pose.
     pub pose: Pose,
 }
+
+impl PoseEntry {
+    /// The pose of a frame of that name, without a time.
+    pub(super) fn named(name: impl Into<String>, pose: Pose) -> Self {
+        Self {
+            name: Some(name.into()),
+            time_s: None,
+            pose,
+        }
+    }
+}

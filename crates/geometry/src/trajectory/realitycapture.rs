@@ -93,11 +93,10 @@ fn camera(line: &str, header: &Header) -> Result<PoseEntry, String> {
     let [x, y, alt, heading, pitch, roll] = values;
     let name = record.get(name).filter(|name| !name.is_empty());
     let name = name.ok_or("the camera has no name")?;
-    Ok(PoseEntry {
-        name: Some(name.to_owned()),
-        time_s: None,
-        pose: Pose::new(rotation([heading, pitch, roll]), Vector3::new(x, y, alt)),
-    })
+    Ok(PoseEntry::named(
+        name,
+        Pose::new(rotation([heading, pitch, roll]), Vector3::new(x, y, alt)),
+    ))
 }
 
 /// The rotation from the camera, in OpenGL's axes, to the world; angles in degrees.
@@ -112,13 +111,11 @@ fn rotation(angles_deg: [f64; 3]) -> UnitQuaternion<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::{CameraAxes, Convention, PoseFile, PoseFormat, read_poses};
+    use crate::trajectory::format_tests::read_named;
+    use crate::trajectory::{CameraAxes, Convention, PoseFile, PoseFormat};
 
     fn read(text: &str) -> Result<PoseFile, String> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("cameras.csv");
-        std::fs::write(&path, text).unwrap();
-        read_poses(&path, None).map_err(|error| error.to_string())
+        read_named("cameras.csv", text)
     }
 
     /// The world-to-camera matrix that the makers of the program publish, row by row: OpenCV's

@@ -1,7 +1,8 @@
 //! The cameras of OpenMVG's `sfm_data.json`.
 //!
-//! A camera is told by the key of its coefficients: `disto_k1`, `disto_k3` (k1, k2, k3), `disto_t2`
-//! (k1, k2, k3, t1, t2), `fisheye` (k1 to k4) or none. The centre of the first pixel is (0, 0).
+//! The key of its coefficients says which model a camera has: `disto_k1`, `disto_k3` (k1, k2, k3),
+//! `disto_t2` (k1, k2, k3, t1, t2), `fisheye` (k1 to k4) or none. The centre of the first pixel is
+//! (0, 0).
 //! Source: OpenMVG 2.1, `Camera_Pinhole*.hpp`, `Camera_undistort_image.hpp`.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
