@@ -69,9 +69,9 @@
 //!
 //! | in | lowest first |
 //! | --- | --- |
-//! | `crates` | `geometry` < `core` < `photometry` < `refine`, `render`, `simulate` < `evaluate` < `src` |
+//! | `crates` | `geometry` < `core` < `photometry`, `super_resolve` < `refine`, `render`, `simulate` < `evaluate` < `src` |
 //! | `crates/geometry` | `files`, `numerics` < `camera` < `trajectory` < `surface` |
-//! | `crates/core` | `bitmap_text`, `colour_map`, `persist`, `points`, `progress` < `raster`, `frames` < `survey`, `test_wall` < `super_resolve` |
+//! | `crates/core` | `bitmap_text`, `colour_map`, `persist`, `points`, `progress` < `raster`, `frames` < `survey`, `test_wall` |
 //! | `crates/refine` | `thresholds`, `options` < `parameters` < `linear` < `points` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `point_fit` < `tracking` < `validation` < `uncertainty` < `verdict` < `report` < `refined` < `stages` < `pipeline` < `reading_search` |
 //! | `crates/render` | `error` < `layout` < `warp` < `sampling` < `compositing` < `output` |
 //! | `src` | `check` < `report`, `inspect` < `cli` |
@@ -141,9 +141,10 @@ pub mod cli;
 pub mod inspect;
 pub mod report;
 
-pub use tunnelstitch_core::{frames, persist, progress, raster, super_resolve, survey};
+pub use tunnelstitch_core::{frames, persist, progress, raster, survey};
 pub use tunnelstitch_evaluate as evaluate;
 pub use tunnelstitch_geometry::{camera, files, surface, trajectory};
 pub use tunnelstitch_refine as refine;
 pub use tunnelstitch_render as render;
 pub use tunnelstitch_simulate as simulate;
+pub use tunnelstitch_super_resolve as super_resolve;

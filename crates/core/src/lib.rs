@@ -13,7 +13,6 @@ pub mod persist;
 pub mod points;
 pub mod progress;
 pub mod raster;
-pub mod super_resolve;
 pub mod survey;
 #[doc(hidden)]
 pub mod test_wall;

@@ -5,7 +5,8 @@ use super::observation::{LinearisedPoint, Observation, Unknowns};
 use super::priors::Priors;
 use nalgebra::SVector;
 use rayon::prelude::*;
-use tunnelstitch_core::frames::{MAD_TO_SIGMA, SHADING_TERMS, Shading};
+use tunnelstitch_core::frames::{SHADING_TERMS, Shading};
+use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 
 /// Reweighting iterations at the most: it takes ten until glints weigh nothing, and three leave the
 /// shading 0.7 % off.

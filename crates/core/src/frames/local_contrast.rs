@@ -1,8 +1,8 @@
 //! Local contrast normalisation, for comparing frames before lighting and exposure are known.
 
 use super::grey::GreyImage;
-use super::noise::MAD_TO_SIGMA;
 use super::windows::{Moments, Windows};
+use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 
 /// Half width of the largest window relative to the image's shorter side.
 const WINDOW_FRACTION: f64 = 1.0 / 8.0;

@@ -34,7 +34,6 @@ pub use hash::hash_frames;
 pub use local_contrast::{LocalContrast, local_contrast, mask_outliers};
 pub use local_normalisation::normalise_locally;
 pub use mask::{Mask, PyramidMask};
-pub use noise::MAD_TO_SIGMA;
 pub use noise::{noise_at_level, noise_sigma};
 pub use picture_decoder::open_picture;
 pub use picture_reading::{PictureOrientation, PictureReading};

@@ -1,9 +1,8 @@
 //! Estimation of sensor noise from single images.
 
 use super::grey::GreyImage;
+use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 
-/// Ratio of a Gaussian's standard deviation to its median absolute deviation.
-pub const MAD_TO_SIGMA: f64 = 1.4826;
 /// Step of rows and columns at which the noise is sampled.
 const SAMPLING_STRIDE: usize = 3;
 

@@ -1,5 +1,8 @@
 //! Medians.
 
+/// Ratio of a Gaussian's standard deviation to its median absolute deviation.
+pub const MAD_TO_SIGMA: f64 = 1.4826;
+
 /// The median of the finite values (the upper of the two middle ones), if there are any.
 pub fn upper_median(mut values: Vec<f64>) -> Option<f64> {
     values.retain(|value| value.is_finite());

@@ -5,7 +5,7 @@
 //! is not smooth: every frame samples it at other fractions of a pixel, and the errors of
 //! interpolation mimic displacements of some hundredths of a pixel. In the joint solve the wall is
 //! a vector x of fine pixels, and a frame's pixel p is the mean over its own square on the wall,
-//! `W_p x`, as in a camera ([`tunnelstitch_core::super_resolve`]). Poses and wall minimise
+//! `W_p x`, as in a camera ([`tunnelstitch_super_resolve`]). Poses and wall minimise
 //!
 //! `J = Σ_p ρ(e_p) + (roughness of x)`,   `e_p = a_i (z_p − W_p x)`,   `z_p = (I_p − b_i)/a_i`.
 //!
@@ -39,7 +39,7 @@
 //!
 //! **Smooth walls** have no detail finer than pixels. There the mean of all frames does better, as
 //! it assumes nothing about the wall. The share of such detail in the pixels follows from the
-//! roughness ([`tunnelstitch_core::super_resolve::aliased_variance`]); where it is small against
+//! roughness ([`tunnelstitch_super_resolve::aliased_variance`]); where it is small against
 //! the noise, the wall is not solved for.
 //!
 //! The wall is solved block by block, with a margin, and x is discarded: memory does not grow with
@@ -60,7 +60,7 @@ use crate::tiles::grid::{TILE, WallGrid, fractions};
 use crate::tiles::residual_weighting::Loss;
 use crate::tiles::tile_moments::{ObserverMoments, TileMoments};
 use std::ops::Range;
-use tunnelstitch_core::super_resolve::{
+use tunnelstitch_super_resolve::{
     FineGrid, Footprints, HUBER_LIMIT_SIGMAS, KINDS, MAX_CG_ITERATIONS, MAX_REWEIGHTING_ITERATIONS,
     Reading, Region, RoughnessEvidence, WallSolve, huber_weight,
 };

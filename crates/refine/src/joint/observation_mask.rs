@@ -4,8 +4,8 @@
 use crate::samples::visibility::Visibility;
 use crate::tiles::grid::{TILE, TileId, WallGrid};
 use std::ops::Range;
-use tunnelstitch_core::super_resolve::Region;
 use tunnelstitch_geometry::surface::WallRegions;
+use tunnelstitch_super_resolve::Region;
 
 /// Observations of the tiles of a region.
 pub struct ObservationMask {

@@ -2,7 +2,7 @@
 
 use crate::samples::visibility::Tile;
 use crate::tiles::grid::{TILE, TileId, WallGrid};
-use tunnelstitch_core::super_resolve::{MARGIN, Region};
+use tunnelstitch_super_resolve::{MARGIN, Region};
 
 /// The fine pixels of some tiles with a margin of [`MARGIN`].
 pub fn region_around(grid: &WallGrid, tiles: &[Tile]) -> Region {

@@ -1,6 +1,6 @@
 //! Robust weights and the scale of residuals.
 
-use tunnelstitch_core::frames::MAD_TO_SIGMA;
+use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 use tunnelstitch_geometry::numerics::median::upper_median;
 
 /// Residual from which Huber's weight falls, σ: 95 % of the efficiency of least squares if errors

@@ -21,9 +21,9 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 use tunnelstitch_core::frames::noise_at_level;
-use tunnelstitch_core::super_resolve::{RoughnessEvidence, aliased_variance};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_super_resolve::{RoughnessEvidence, aliased_variance};
 
 /// Tiles of one piece of parallel work.
 const TILES_PER_TASK: usize = 32;

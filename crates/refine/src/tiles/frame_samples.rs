@@ -6,11 +6,11 @@ use crate::tiles::grid::{Plane, TilePoints, ZERO};
 use crate::tiles::interpolation::{Interpolation, cubic_weights};
 use nalgebra::{Matrix2x6, Matrix3, SMatrix, Vector3};
 use tunnelstitch_core::frames::GreyImage;
-use tunnelstitch_core::super_resolve::{self, Reading};
 use tunnelstitch_geometry::camera::{Camera, LensF32, LensLoop, ProjectF32, Sweep};
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_geometry::surface::{Surface, bend_jacobian, lens_jacobian, wall_jacobian};
 use tunnelstitch_geometry::trajectory::Pose;
+use tunnelstitch_super_resolve::{PosedCamera, Reading};
 
 /// 2²³: added to a non-negative float, it rounds it to an integer in the last bits of the sum.
 /// Unlike a cast, which saturates, this vectorises.
@@ -74,8 +74,8 @@ impl<'a> SampledFrame<'a> {
     }
 
     /// Camera and pose, for the search of pixel footprints.
-    pub fn view(&self) -> super_resolve::PosedCamera<'_> {
-        super_resolve::PosedCamera {
+    pub fn view(&self) -> PosedCamera<'_> {
+        PosedCamera {
             camera: self.camera,
             pose: &self.pose,
         }

@@ -1,7 +1,7 @@
 //! Noise model of the residuals, robust loss, and robust statistics.
 
 use crate::thresholds::residual_weighting::TUKEY_CUTOFF_SIGMAS;
-use tunnelstitch_core::frames::MAD_TO_SIGMA;
+use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 
 /// Variance of the residuals at a wall sample with the texture gradient g (grey levels per sample):
 /// `v(g) = σ² + κ g²`.

@@ -12,8 +12,9 @@ use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
 use crate::validation::alignment::Alignment;
 use crate::validation::lucas_kanade_fit::{AffineFit, TemplateSample};
 use nalgebra::{Vector3, Vector6};
-use tunnelstitch_core::frames::{MAD_TO_SIGMA, Pyramid, noise_at_level};
+use tunnelstitch_core::frames::{Pyramid, noise_at_level};
 use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 use tunnelstitch_geometry::surface::{Footprint, WallPoint};
 use tunnelstitch_geometry::trajectory::Pose;
 

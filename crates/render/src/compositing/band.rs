@@ -6,8 +6,8 @@ use crate::layout::placement::NO_FRAME;
 use crate::layout::tiles::{BAND_ROWS, Tile};
 use crate::sampling::pixel_format::PixelFormat;
 use crate::sampling::sample::{Sample, Samples};
-use tunnelstitch_core::super_resolve::Region;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_super_resolve::Region;
 
 /// A stretch of the canvas, all around and some rows along.
 #[derive(Clone, Debug)]

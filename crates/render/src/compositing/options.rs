@@ -28,7 +28,7 @@ pub struct RenderOptions {
     /// True if exposure is undone and light is blended over seams; else frames keep their values.
     pub blend: bool,
     /// True if the wall is solved from all frames, finer than any of them
-    /// ([`tunnelstitch_core::super_resolve`]); exposure must be undone for it.
+    /// ([`tunnelstitch_super_resolve`]); exposure must be undone for it.
     pub super_resolve: bool,
 }
 

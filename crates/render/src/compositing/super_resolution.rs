@@ -1,5 +1,5 @@
 //! Bands finer than any frame: drawn as usual and then solved from all frames
-//! ([`tunnelstitch_core::super_resolve`]).
+//! ([`tunnelstitch_super_resolve`]).
 
 use super::band::Band;
 use crate::layout::canvas::Canvas;
@@ -11,9 +11,9 @@ use crate::sampling::picture_cache::PictureCache;
 use crate::sampling::sample::{Sample, Samples};
 use std::collections::BTreeMap;
 use tunnelstitch_core::frames::{GreyImage, noise_sigma};
-use tunnelstitch_core::super_resolve::{Footprints, MARGIN, PosedCamera, Reading, Region};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
+use tunnelstitch_super_resolve::{Footprints, MARGIN, PosedCamera, Reading, Region};
 
 /// Variance of rounding to whole grey levels.
 const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;

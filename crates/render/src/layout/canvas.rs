@@ -4,8 +4,8 @@ use super::placement::Placement;
 use crate::error::RenderError;
 use image::DynamicImage;
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::super_resolve::FineGrid;
 use tunnelstitch_geometry::surface::{Footprint, Surface, WallPoint};
+use tunnelstitch_super_resolve::FineGrid;
 
 /// Orientation of the panorama in its picture file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,10 +3,10 @@
 use super::outline::{keep_regions, picture};
 use super::ridges::smoothed;
 use super::temporal_statistics::TemporalStatistics;
-use crate::frames::noise::MAD_TO_SIGMA;
 use image::GrayImage;
 use imageproc::distance_transform::Norm;
 use imageproc::morphology::{dilate, open};
+use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 use tunnelstitch_geometry::numerics::median::median;
 
 /// Largest spread of a constant pixel, multiple of the picture's median.

@@ -3,8 +3,8 @@
 use super::motion_field::MotionField;
 use super::temporal_statistics::TemporalStatistics;
 use crate::frames::grey::GreyImage;
-use crate::frames::noise::MAD_TO_SIGMA;
 use rayon::prelude::*;
+use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 use tunnelstitch_geometry::numerics::median::median;
 
 /// Smoothing (passes of `[1 2 1]/4` along both axes) and distance, pixels, of the differences:

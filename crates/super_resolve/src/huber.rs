@@ -1,6 +1,6 @@
 //! Huber's loss and a robust standard deviation.
 
-use crate::frames::MAD_TO_SIGMA;
+use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 
 /// Huber's weight of a residual r: 1 up to the limit, `limit/|r|` beyond, where the loss is linear.
 ///

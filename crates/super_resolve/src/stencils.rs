@@ -1,6 +1,6 @@
 //! Stencils: sparse rows of the observation matrix from fine pixels to pixels.
 
-use crate::super_resolve::region::Region;
+use crate::region::Region;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// Maximum fine pixels along a side of a stencil.

@@ -1,10 +1,10 @@
 //! Joint estimation of fine pixels and roughness by evidence maximisation.
 
-use crate::super_resolve::footprints::Footprints;
-use crate::super_resolve::huber;
-use crate::super_resolve::reading::Reading;
-use crate::super_resolve::roughness::{KINDS, Roughness};
-use crate::super_resolve::wall_solve::WallSolve;
+use crate::footprints::Footprints;
+use crate::huber;
+use crate::reading::Reading;
+use crate::roughness::{KINDS, Roughness};
+use crate::wall_solve::WallSolve;
 
 /// Iterations of solving, reweighting and roughness estimation.
 pub const MAX_REWEIGHTING_ITERATIONS: usize = 4;

@@ -1,10 +1,10 @@
 //! Least-squares solve for the fine pixels of a region, for given weights and roughness.
 
-use crate::super_resolve::conjugate_gradients::conjugate_gradients;
-use crate::super_resolve::footprints::Footprints;
-use crate::super_resolve::observations::Observations;
-use crate::super_resolve::reading::Reading;
-use crate::super_resolve::roughness::{KINDS, Roughness};
+use crate::conjugate_gradients::conjugate_gradients;
+use crate::footprints::Footprints;
+use crate::observations::Observations;
+use crate::reading::Reading;
+use crate::roughness::{KINDS, Roughness};
 
 /// Margin of a region around its tile, fine pixels.
 pub const MARGIN: usize = 8;

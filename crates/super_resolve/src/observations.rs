@@ -1,7 +1,7 @@
 //! Observations of a region: pixel readings with robust weights.
 
-use crate::super_resolve::footprints::Footprints;
-use crate::super_resolve::reading::Reading;
+use crate::footprints::Footprints;
+use crate::reading::Reading;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// Readings of all views with their footprints and weights.

@@ -1,6 +1,6 @@
 //! Roughness prior of the wall: weighted differences of fine pixels.
 
-use crate::super_resolve::huber;
+use crate::huber;
 use std::f64::consts::PI;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 

@@ -1,8 +1,8 @@
 //! Footprints of the frames' pixels on a region of the wall, as stencils of fine pixels.
 
-use crate::super_resolve::reading::Reading;
-use crate::super_resolve::region::{FineGrid, Region};
-use crate::super_resolve::stencils::{MAX_STENCIL_WIDTH, PixelFootprint, Stencils};
+use crate::reading::Reading;
+use crate::region::{FineGrid, Region};
+use crate::stencils::{MAX_STENCIL_WIDTH, PixelFootprint, Stencils};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::Pose;
@@ -196,8 +196,8 @@ fn visible_window(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_wall::{TestWall, waves};
     use nalgebra::Vector3;
+    use tunnelstitch_core::test_wall::{TestWall, waves};
 
     /// A region of 60 × 40 fine pixels in the centre of a frame, optionally across θ = 0.
     fn seen(across: bool) -> (TestWall, FineGrid, Footprints, usize) {
