@@ -11,8 +11,22 @@ use std::sync::LazyLock;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_core::test_wall::TestWall;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
-use tunnelstitch_geometry::surface::{Circle, Footprint, WallRegions};
+use tunnelstitch_geometry::surface::{Circle, Footprint, WallPoint, WallRegions};
 use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose, Shutter, spiral};
+
+/// Bricks around.
+pub const BRICKS: f64 = 60.0;
+
+/// Bricks, each of its own grey value, 10 × 6 cm, between light joints of 1 cm.
+pub fn bricks(wall: WallPoint, perimeter_m: f64) -> f64 {
+    let (x, y) = (BRICKS * wall.s_m / perimeter_m, wall.h_m / 0.06);
+    let of_brick = |x: f64, joint: f64| x.rem_euclid(1.0) > joint;
+    if !of_brick(x, 0.1) || !of_brick(y, 0.17) {
+        return 160.0;
+    }
+    let brick = 12.9898 * x.floor().rem_euclid(BRICKS) + 78.233 * y.floor();
+    90.0 + 80.0 * (43758.5453 * brick.sin()).rem_euclid(1.0)
+}
 
 /// Prior of independent poses with 1-σ of 0.05 rad and 5 cm, one frame per second.
 pub fn independent_prior(initial: &[Pose]) -> Prior {

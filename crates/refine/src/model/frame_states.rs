@@ -51,14 +51,10 @@ impl FrameStates {
             .collect()
     }
 
-    /// True if most frames are inliers. If not, the inliers may be those that are wrong, and to
+    /// True if the inliers have a [`majority`]. If not, they may be those that are wrong, and to
     /// register the others on them is in vain.
     pub fn has_majority(&self) -> bool {
-        let inliers = self
-            .rejections
-            .iter()
-            .filter(|rejection| rejection.is_none());
-        2 * inliers.count() > self.rejections.len()
+        majority(&self.rejections).is_ok()
     }
 
     /// Rejects frames, each with its reason.
@@ -66,5 +62,42 @@ impl FrameStates {
         for (frame, reason) in rejected {
             self.rejections[frame] = Some(reason);
         }
+    }
+}
+
+/// Whether most of the frames that show something are inliers; if not, the reason for which none of
+/// them is right: they may fit each other by chance. Nor is a single one, which agrees with no
+/// other.
+pub fn majority(rejections: &[Option<RejectionReason>]) -> Result<(), RejectionReason> {
+    let shows_something = |rejection: &&Option<RejectionReason>| {
+        !(rejection.as_ref()).is_some_and(RejectionReason::shows_nothing)
+    };
+    let shown = rejections.iter().filter(shows_something).count();
+    let frames = rejections.iter().filter(|one| one.is_none()).count();
+    if frames > 1 && 2 * frames > shown {
+        Ok(())
+    } else {
+        Err(RejectionReason::Minority { frames, shown })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half of the frames may fit each other as far off as the other half.
+    #[test]
+    fn half_is_no_majority_and_frames_that_show_nothing_do_not_count() {
+        let rejected = || Some(RejectionReason::Disconnected { frames: 2 });
+        let dark = || Some(RejectionReason::Featureless);
+        assert!(majority(&[None, None, None, rejected(), rejected()]).is_ok());
+        assert!(majority(&[None, None, rejected(), dark(), dark()]).is_ok());
+        let minority = RejectionReason::Minority {
+            frames: 2,
+            shown: 4,
+        };
+        let half = [None, None, rejected(), rejected(), dark()];
+        assert_eq!(majority(&half), Err(minority));
+        assert!(majority(&[None, dark()]).is_err());
     }
 }

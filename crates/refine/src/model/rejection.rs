@@ -23,13 +23,6 @@ pub enum RejectionReason {
         /// Distance on the wall between the image centres at the two poses, metres.
         separation_m: f64,
     },
-    /// The image contradicts frames that agree among themselves.
-    Contradicts {
-        /// One of them.
-        frame: usize,
-        /// Correlation of local contrast with it.
-        correlation: f64,
-    },
     /// The image is blurred.
     Blurred {
         /// Its contrast at the finest detail over that of its neighbours, 0 to 1.
@@ -91,10 +84,7 @@ impl RejectionReason {
     pub fn is_misfit(&self) -> bool {
         matches!(
             self,
-            Self::NoMatch { .. }
-                | Self::Ambiguous { .. }
-                | Self::Contradicts { .. }
-                | Self::Disagrees { .. }
+            Self::NoMatch { .. } | Self::Ambiguous { .. } | Self::Disagrees { .. }
         )
     }
 
@@ -104,7 +94,6 @@ impl RejectionReason {
             self,
             Self::NoMatch { .. }
                 | Self::Ambiguous { .. }
-                | Self::Contradicts { .. }
                 | Self::Disagrees { .. }
                 | Self::Misaligned { .. }
                 | Self::Disconnected { .. }
@@ -126,11 +115,6 @@ impl fmt::Display for RejectionReason {
                 f,
                 "it matches the wall equally well at two places {separation_m:.2} m apart, \
                  and the prior does not tell which"
-            ),
-            Self::Contradicts { frame, correlation } => write!(
-                f,
-                "it contradicts frames that agree among themselves \
-                 (correlation {correlation:.2} with frame {frame})"
             ),
             Self::Blurred { share } => write!(
                 f,
@@ -175,8 +159,8 @@ impl fmt::Display for RejectionReason {
             Self::Minority { frames: 1, .. } => write!(f, "it fits no other frame"),
             Self::Minority { frames, shown } => write!(
                 f,
-                "only {frames} of {shown} frames fit each other, which may be chance where most \
-                 do not"
+                "only {frames} of {shown} frames fit each other, which may be chance where so \
+                 many do not"
             ),
             Self::Unsolved => write!(f, "the equations of the survey have no solution"),
             Self::Uncertain { wall_px } => write!(

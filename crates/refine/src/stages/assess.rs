@@ -2,7 +2,7 @@
 
 use crate::error::RefineError;
 use crate::model::context::EstimationContext;
-use crate::model::frame_states::FrameStates;
+use crate::model::frame_states::{FrameStates, majority};
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS, Calibration, Kappa};
@@ -153,9 +153,8 @@ fn frame_sigmas(
         .collect()
 }
 
-/// Decides about every frame that no earlier test has rejected. If most frames that show something
-/// do not fit, the others may fit each other by chance, and none is photometric; nor is a single
-/// one, which agrees with no other.
+/// Decides about every frame that no earlier test has rejected; none is photometric without a
+/// [`majority`].
 fn judge(
     setup: &Setup,
     solution: &Solution,
@@ -174,14 +173,9 @@ fn judge(
         };
         *rejection = evidence.judge(setup.options);
     }
-    let is_shown = |rejection: &&Option<RejectionReason>| {
-        !(rejection.as_ref()).is_some_and(RejectionReason::shows_nothing)
-    };
-    let shown = rejections.iter().filter(is_shown).count();
-    let frames = rejections.iter().filter(|one| one.is_none()).count();
-    if frames == 1 || 2 * frames < shown {
+    if let Err(reason) = majority(rejections) {
         for rejection in rejections {
-            rejection.get_or_insert(RejectionReason::Minority { frames, shown });
+            rejection.get_or_insert_with(|| reason.clone());
         }
     }
 }

@@ -53,7 +53,7 @@ pub fn align_pairs(
     let camera = context.camera.at_level(level);
     let overlaps = Overlaps::of(context, &camera, states, frame_range)?;
     let mut alignments = Vec::new();
-    for Batch { partners, needed } in overlaps.batches(|_, _| true) {
+    for Batch { partners, needed } in overlaps.batches() {
         let pyramids: BTreeMap<usize, Arc<Pyramid>> = needed
             .par_map(|&k| Ok((k, context.frames.get(k)?)))
             .into_iter()
@@ -85,32 +85,90 @@ pub fn align_pairs(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::{frame_states, independent_prior, test_context};
-    use tunnelstitch_core::frames::FrameCache;
+    use crate::model::rejection::RejectionReason;
+    use crate::options::RefineOptions;
+    use crate::test_scene::{BRICKS, bricks, frame_states, independent_prior, test_context};
+    use crate::validation::inconsistent_frames::find_inconsistent_frames;
+    use tunnelstitch_core::frames::{FrameCache, GreyImage};
     use tunnelstitch_core::test_wall::{TestWall, waves};
+    use tunnelstitch_geometry::surface::{GaugeMotion, WallPoint};
     use tunnelstitch_geometry::trajectory::Pose;
 
-    /// Alignments of a ring of frames at the given poses.
-    fn align_ring(wall: &TestWall, poses: &[Pose]) -> Vec<Alignment> {
-        let pictures = wall
-            .frames()
-            .into_iter()
-            .map(|frame| Pyramid::new(frame, 1));
-        let frames = FrameCache::of_pyramids(pictures.collect());
+    /// Alignments of these pictures at the given poses.
+    fn align(wall: &TestWall, pictures: Vec<GreyImage>, poses: &[Pose]) -> Vec<Alignment> {
+        let pyramids = pictures.into_iter().map(|frame| Pyramid::new(frame, 1));
+        let frames = FrameCache::of_pyramids(pyramids.collect());
         let prior = independent_prior(poses);
         let context = test_context(wall, &frames, &prior);
         let states = frame_states(poses);
         align_pairs(&context, 0, &states, &(0..poses.len())).unwrap()
     }
 
+    fn inconsistent(alignments: &[Alignment], frames: usize) -> Vec<usize> {
+        let found = find_inconsistent_frames(alignments, frames, &RefineOptions::default());
+        found
+            .into_iter()
+            .map(|(frame, _): (usize, RejectionReason)| frame)
+            .collect()
+    }
+
     #[test]
     fn frames_at_true_poses_are_aligned() {
         let wall = TestWall::ring(waves);
-        let found = align_ring(&wall, &wall.poses);
+        let found = align(&wall, wall.frames(), &wall.poses);
         assert!(found.len() >= 14);
         for pair in found {
             assert!(pair.error_px < 0.05, "{pair:?}");
         }
+    }
+
+    #[test]
+    fn frames_of_bricks_at_true_poses_are_consistent() {
+        let wall = TestWall::ring(bricks);
+        let found = align(&wall, wall.frames(), &wall.poses);
+        assert!(
+            found.iter().all(|pair| pair.correlation > 0.8),
+            "{found:#?}"
+        );
+        assert_eq!(
+            inconsistent(&found, wall.poses.len()),
+            [0usize; 0],
+            "{found:#?}"
+        );
+    }
+
+    /// All joints lie on joints.
+    #[test]
+    fn frame_displaced_by_a_brick_is_found() {
+        let wall = TestWall::ring(bricks);
+        let mut poses = wall.poses.clone();
+        let brick = GaugeMotion::about_y(std::f64::consts::TAU / BRICKS, 0.0);
+        poses[5] = brick.apply(&poses[5]);
+        let found = align(&wall, wall.frames(), &poses);
+        assert_eq!(inconsistent(&found, poses.len()), [5], "{found:#?}");
+    }
+
+    /// Dark in some frames and bright in others, with the wall between as it is.
+    #[test]
+    fn glints_and_water_do_not_displace() {
+        let faint =
+            |wall: WallPoint, perimeter_m: f64| 128.0 + 0.1 * (waves(wall, perimeter_m) - 128.0);
+        let wall = TestWall::ring(faint);
+        let mut pictures = wall.frames();
+        for (k, picture) in pictures.iter_mut().enumerate() {
+            let (w, glint) = (picture.width(), if k % 2 == 0 { 240.0 } else { 20.0 });
+            for (n, value) in picture.data_mut().iter_mut().enumerate() {
+                if (n % w + 7 * k) % 40 < 6 && (n / w) % 30 < 6 {
+                    *value = glint;
+                }
+            }
+        }
+        let found = align(&wall, pictures, &wall.poses);
+        assert_eq!(
+            inconsistent(&found, wall.poses.len()),
+            [0usize; 0],
+            "{found:#?}"
+        );
     }
 
     /// A frame shifted along the tunnel by 10 mm is 1 cm · f / 1 m ≈ 1 px off all it overlaps.
@@ -121,7 +179,7 @@ mod tests {
         poses[5].t_wc.y += 0.01;
         let expected = 0.01 * wall.camera.fy;
         let mut seen = 0;
-        for pair in align_ring(&wall, &poses) {
+        for pair in align(&wall, wall.frames(), &poses) {
             if pair.a == 5 || pair.b == 5 {
                 seen += 1;
                 let ratio = pair.error_px / expected;
