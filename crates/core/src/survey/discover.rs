@@ -1,6 +1,7 @@
 //! Search of a folder for the parts of a survey.
 
 use super::file::SURVEY_FILE;
+use super::straight_axis::FoundAxis;
 use crate::frames::{FrameError, Video, open_picture};
 use image::ImageDecoder;
 use std::collections::BTreeMap;
@@ -62,6 +63,12 @@ pub struct Discovery {
     /// Pose files; first those with as many poses as frames, and among these first those not named
     /// as ground truth.
     pub poses: Vec<(PathBuf, PoseFile)>,
+    /// Length of a unit of the initial poses, metres, if the user told it
+    /// ([`Discovery::find_axis`]).
+    pub unit_m: Option<f64>,
+    /// The tunnel's axis in the world of the initial poses, if they show that it is not the
+    /// world's y axis ([`Discovery::find_axis`]).
+    pub axis: Option<FoundAxis>,
 }
 
 impl Discovery {
@@ -158,6 +165,20 @@ impl Discovery {
         });
         self.sort();
         Ok(())
+    }
+
+    /// Notes the length of a unit of the initial poses, metres, if it is known, and finds the axis
+    /// of a straight tunnel of that radius, if it is known, for poses of structure from motion.
+    pub fn find_axis(&mut self, unit_m: Option<f64>, radius_m: Option<f64>) {
+        let initial = self.initial();
+        self.axis = initial.and_then(|(_, poses)| FoundAxis::of(poses, unit_m, radius_m));
+        self.unit_m = unit_m;
+    }
+
+    /// True if the initial poses are in a unit that neither their format nor the user tells.
+    pub fn lacks_scale(&self) -> bool {
+        let initial = self.initial();
+        self.unit_m.is_none() && initial.is_some_and(|(_, poses)| poses.format.has_no_scale())
     }
 
     /// Number of frames, and their size if known, pixels.
