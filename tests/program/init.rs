@@ -96,3 +96,39 @@ fn poses_in_the_tunnel_stay_as_they_are() {
     assert_eq!(std::fs::read_to_string(&own).unwrap(), "{}");
     assert!(!aside.path().join("survey.toml").exists());
 }
+
+/// Every file of the folder is taken or named with the reason.
+#[test]
+fn what_is_left_aside_is_named_with_the_reason() {
+    let survey = first_frames(4);
+    let dir = survey.path();
+    let write = |name: &str, content: &str| std::fs::write(dir.join(name), content).unwrap();
+    write("notes.txt", "Monday\n");
+    write("short.tum", "0 0 0 0 0 0 0 1\n1 0 0 0.1 0 0 0\n");
+    write("depth_0.npy", "");
+    write("depth_1.npy", "");
+    write("wall.laz", "");
+    write("frame.json", r#"{"point_m": [0, 0, 0], "axis": [1, 0, 0]}"#);
+    std::fs::copy(dir.join("camera.json"), dir.join("camera2.json")).unwrap();
+    std::fs::create_dir_all(dir.join("a/b/c/d")).unwrap();
+    let said = init(dir, &["--radius-m", "3", "--force"]);
+    for part in [
+        "camera2.json (480 × 360 px): one is enough",
+        "no poses: line 1: in no known format\n",
+        "short.tum: no poses: line 2: ",
+        "*.npy (2): by its name no file of a survey",
+        "wall.laz: measured points: points = \"wall.laz\" under [tunnel]",
+        "frame.json: a frame of reference: tunnel_frame = \"frame.json\" under [poses]",
+        "a/b/c/d: not searched",
+    ] {
+        assert!(said.contains(part), "no {part} in {said}");
+    }
+    let output = tunnelstitch(&["init", text(dir), "--force", "--json"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let aside = report["left_aside"].as_array().unwrap();
+    let npy = aside
+        .iter()
+        .find(|aside| aside["pattern"] == "*.npy")
+        .unwrap();
+    assert_eq!(npy["count"], 2, "{report}");
+}

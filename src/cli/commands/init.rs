@@ -1,10 +1,11 @@
 //! `tunnelstitch init`: writes a `survey.toml` for the files of a folder.
 
+use super::init_summary::summary;
 use crate::cli::arguments::positive;
 use crate::cli::output::{Failure, Terminal};
 use crate::files::printed;
 use crate::persist::atomic;
-use crate::survey::{AXIS_FILE, Discovery, FoundAxis, SURVEY_FILE, Survey, SurveyError};
+use crate::survey::{AXIS_FILE, Discovery, LeftAside, SURVEY_FILE, Survey, SurveyError};
 use crate::trajectory::TunnelAxis;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -53,6 +54,7 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
     let mut found = Discovery::of(folder)
         .map_err(|error| Failure::input(format!("{}: {error}", printed(folder))))?;
     choose_frames(arguments, &mut found)?;
+    found.find_bits(folder);
     found.find_axis(arguments.unit_m, arguments.radius_m);
     for line in summary(&found) {
         terminal.say(line);
@@ -65,17 +67,18 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
     if let Some(sentence) = unknown_scale(&found) {
         terminal.warn(sentence);
     }
-    let missing = Survey::open(folder)
-        .err()
-        .map(|error| missing(&found, &error));
+    let fault = found.picture_frames().and_then(|group| group.fault.clone());
+    let missing = match Survey::open(folder) {
+        Ok(_) => fault,
+        Err(error) => Some(missing(&found, &error)),
+    };
     match &missing {
         None => terminal.say(format!("next: tunnelstitch check {}", printed(folder))),
         Some(missing) => terminal.warn(format!("not ready yet: {missing}")),
     }
-    let is_video = found.video.is_some();
     terminal.result(&InitReport {
         survey_file: &path,
-        images: (found.pictures.first().filter(|_| !is_video)).map(|group| group.pattern.as_str()),
+        images: found.picture_frames().map(|group| group.pattern.as_str()),
         video: found.video.as_ref().map(|video| video.path.as_path()),
         mask: found.mask.as_deref(),
         calibration: found.calibrations.first().map(|(path, _)| path.as_path()),
@@ -83,6 +86,7 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
         true_poses: found.truth().map(|(path, _)| path.as_path()),
         tunnel_axis: found.axis.as_ref().map(|found| &found.axis),
         lacks_scale: found.lacks_scale(),
+        left_aside: &found.left_aside,
         missing,
     })
 }
@@ -148,6 +152,8 @@ struct InitReport<'a> {
     true_poses: Option<&'a Path>,
     /// The axis in axis.json, if one was found.
     tunnel_axis: Option<&'a TunnelAxis>,
+    /// The other files and folders.
+    left_aside: &'a [LeftAside],
     /// True if the poses have no known scale.
     lacks_scale: bool,
     /// The error that keeps the survey from being used, if there is one.
@@ -167,15 +173,28 @@ fn choose_frames(arguments: &InitArguments, found: &mut Discovery) -> Result<(),
             found.choose_video(folder, &video, arguments.every.unwrap_or(1) as usize)?;
             Ok(())
         }
-        None if found.pictures.is_empty() => Err(Failure::input(format!(
-            "{}: holds no pictures (JPEG, PNG, TIFF, WebP) and no video, up to three folders below",
-            printed(folder)
-        ))),
+        None if found.pictures.is_empty() => Err(no_frames(folder, found)),
         None if arguments.every.is_some() => Err(Failure::usage(
             "--every needs a video, but the folder holds pictures: name the video with --video",
         )),
         None => Ok(()),
     }
+}
+
+/// The error of a folder without pictures that are read, and without a video.
+fn no_frames(folder: &Path, found: &Discovery) -> Failure {
+    let unread = found
+        .left_aside
+        .iter()
+        .find(|aside| aside.is_unread_picture());
+    let unread = unread.map_or(String::new(), |aside| {
+        format!("; {} ({}): {}", aside.pattern, aside.count, aside.reason)
+    });
+    Failure::input(format!(
+        "{}: holds no pictures (JPEG, PNG, TIFF, WebP) and no video, up to three folders \
+         below{unread}",
+        printed(folder)
+    ))
 }
 
 /// A path as survey.toml in `folder` has it.
@@ -186,77 +205,4 @@ fn relative_to(folder: &Path, path: &Path) -> PathBuf {
     });
     // A missing file is reported when it is opened.
     relative.unwrap_or_else(|| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()))
-}
-
-/// Lists what was recognised, one line each.
-fn summary(found: &Discovery) -> Vec<String> {
-    let mut lines = Vec::new();
-    let row = |name: &str, text: String| format!("  {name:<16}{text}");
-    if let Some(video) = &found.video {
-        let (width, height) = video.size;
-        let count = match video.every {
-            1 => video.count.to_string(),
-            every => format!("{} of every {every}", video.count),
-        };
-        let path = printed(&video.path);
-        lines.push(row(
-            "frames",
-            format!("{path} ({count} pictures, {width} × {height} px)"),
-        ));
-    }
-    let chosen = found.video.as_ref().map(|video| &video.path);
-    for video in found.videos.iter().filter(|video| Some(*video) != chosen) {
-        lines.push(row("other video", printed(video).to_string()));
-    }
-    for (k, group) in found.pictures.iter().enumerate() {
-        let size = group
-            .size
-            .map_or("unreadable".to_owned(), |(w, h)| format!("{w} × {h} px"));
-        let name = if k == 0 && found.video.is_none() {
-            "frames"
-        } else {
-            "other pictures"
-        };
-        let text = format!("{} ({}, {size})", group.pattern, group.count);
-        lines.push(row(name, text));
-    }
-    if let Some(mask) = &found.mask {
-        lines.push(row("mask", printed(mask).to_string()));
-    }
-    for (k, (path, camera)) in found.calibrations.iter().enumerate() {
-        let name = if k == 0 { "calibration" } else { "another" };
-        let (width, height) = (camera.width, camera.height);
-        let text = format!("{} ({width} × {height} px)", printed(path));
-        lines.push(row(name, text));
-    }
-    let is_same = |other: Option<&(PathBuf, _)>, path: &Path| other.is_some_and(|(p, _)| p == path);
-    for (path, poses) in &found.poses {
-        let name = if is_same(found.initial(), path) {
-            "initial poses"
-        } else if is_same(found.truth(), path) {
-            "true poses"
-        } else {
-            "other poses"
-        };
-        let (format, count) = (poses.format, poses.entries.len());
-        lines.push(row(
-            name,
-            format!("{} ({format:?}, {count} poses)", printed(path)),
-        ));
-    }
-    if let Some(found) = &found.axis {
-        lines.push(row("axis", axis_text(found)));
-    }
-    lines
-}
-
-/// The description of a found axis, in the unit of the poses.
-fn axis_text(found: &FoundAxis) -> String {
-    let path = &found.path;
-    let [x, y, z] = found.axis.axis;
-    format!(
-        "{AXIS_FILE} ({x:.3} {y:.3} {z:.3}, the line through {} of {} cameras: {:.4} RMS and {:.4} \
-         at most off it over a length of {:.4} units of the poses)",
-        path.count, found.poses, path.rms_distance, path.max_distance, path.length
-    )
 }

@@ -81,6 +81,7 @@ impl Discovery {
                 quoted(pattern)
             ),
         };
+        self.write_reading(text);
         let _ = match &self.mask {
             Some(mask) => writeln!(
                 text,
@@ -92,6 +93,34 @@ impl Discovery {
                 "# mask = \"mask.png\"    # a picture of the frames' size, black where none of \
                  them shows the wall"
             ),
+        };
+    }
+
+    /// Writes the reading of the pictures that they ask for.
+    fn write_reading(&self, text: &mut String) {
+        if let Some(bits) = self.bits {
+            let _ = writeln!(
+                text,
+                "bits = {bits}    # no value of the 16-bit files has more; take this away if the \
+                 camera delivers 16"
+            );
+        }
+        let names_orientation = self
+            .picture_frames()
+            .is_some_and(|g| g.turned_size.is_some());
+        let _ = match self.orientation() {
+            Some(orientation) => writeln!(
+                text,
+                "orientation = \"{}\"    # EXIF data ask to turn the pictures; the calibration \
+                 fits only this",
+                orientation.name()
+            ),
+            None if names_orientation => writeln!(
+                text,
+                "# orientation = \"exif\"    # EXIF data ask to turn the pictures: if the camera \
+                 was calibrated with turned ones; otherwise \"stored\""
+            ),
+            None => Ok(()),
         };
     }
 

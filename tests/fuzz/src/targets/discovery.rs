@@ -24,6 +24,7 @@ pub fn run(data: &[u8]) {
     };
     let (folder, _path) = file(NAMES[usize::from(*first) % NAMES.len()], content);
     let mut found = Discovery::of(folder.path()).unwrap();
+    found.find_bits(folder.path());
     found.find_axis(Some(0.5), Some(3.0));
     let _ = (found.frames(), found.truth(), found.survey_toml(None));
 }
