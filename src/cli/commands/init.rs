@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 /// them.
 ///
 /// The frames are the largest group of pictures in one folder, or those of a video if there are no
-/// pictures. A calibration that fits their size and poses of the same number are preferred. Poses of
-/// structure from motion on a straight line tell the tunnel's axis, which is written to axis.json.
-/// The command prints what it has recognised and what is missing.
+/// pictures. A calibration that fits their size and poses of the same number are preferred. Poses
+/// of structure from motion on a straight line tell the tunnel's axis, which is written to
+/// axis.json. The command prints what it took, what it left aside and why, and what is missing.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch init my-survey --radius-m 1.5\n  \
@@ -28,8 +28,8 @@ pub struct InitArguments {
     /// Radius of the tunnel, metres; without it survey.toml has a line to be filled in.
     #[arg(long, value_name = "M", value_parser = positive)]
     radius_m: Option<f64>,
-    /// Metres of one unit of the poses. Programs of structure from motion give poses without a scale:
-    /// divide a measured length by the same length in units of the poses.
+    /// Metres of one unit of the poses. Programs of structure from motion give poses without a
+    /// scale: divide a measured length by the same length in units of the poses.
     #[arg(long, value_name = "M", value_parser = positive)]
     unit_m: Option<f64>,
     /// Video that holds the frames. ffmpeg decodes it picture by picture; no pictures are stored.
@@ -68,16 +68,19 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
         terminal.warn(sentence);
     }
     let fault = found.picture_frames().and_then(|group| group.fault.clone());
-    let missing = match Survey::open(folder) {
-        Ok(_) => fault,
-        Err(error) => Some(missing(&found, &error)),
-    };
+    let missing =
+        Survey::open(folder).map_or_else(|error| Some(missing(&found, &error)), |_| fault);
     match &missing {
         None => terminal.say(format!("next: tunnelstitch check {}", printed(folder))),
         Some(missing) => terminal.warn(format!("not ready yet: {missing}")),
     }
-    terminal.result(&InitReport {
-        survey_file: &path,
+    terminal.result(&report(&path, &found, missing))
+}
+
+/// The result for `--json`.
+fn report<'a>(path: &'a Path, found: &'a Discovery, missing: Option<String>) -> InitReport<'a> {
+    InitReport {
+        survey_file: path,
         images: found.picture_frames().map(|group| group.pattern.as_str()),
         video: found.video.as_ref().map(|video| video.path.as_path()),
         mask: found.mask.as_deref(),
@@ -88,7 +91,7 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
         lacks_scale: found.lacks_scale(),
         left_aside: &found.left_aside,
         missing,
-    })
+    }
 }
 
 /// Refuses to replace a file without `--force`.

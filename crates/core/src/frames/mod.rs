@@ -46,7 +46,7 @@ pub use static_pixels::{
 };
 pub use stored_frame::StoredFrame;
 pub use unread_format::UnreadFormat;
-pub use used_bits::{UNUSED_UPPER_BITS, used_bits};
+pub use used_bits::{UNUSED_UPPER_BITS, has_sixteen_bits, used_bits};
 pub use video::Video;
 pub use write::{
     FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, add_picture, write_picture,

@@ -11,8 +11,12 @@ pub const UNUSED_UPPER_BITS: RangeInclusive<u32> = 9..=14;
 
 /// Bits of a frame's brightest value, if its file is of 16 bits.
 pub fn used_bits(file: &FrameFile, frame: &StoredFrame) -> Option<u32> {
-    let colour = colour_type(file).ok()?;
-    let is_deep = colour.bits_per_pixel() == 16 * u16::from(colour.channel_count());
-    let brightest = frame.brightest().filter(|_| is_deep)?;
+    let brightest = frame.brightest().filter(|_| has_sixteen_bits(file))?;
     Some(u16::BITS - brightest.leading_zeros())
+}
+
+/// True if the file of a frame has values of 16 bits, by its header.
+pub fn has_sixteen_bits(file: &FrameFile) -> bool {
+    colour_type(file)
+        .is_ok_and(|colour| colour.bits_per_pixel() == 16 * u16::from(colour.channel_count()))
 }

@@ -87,16 +87,13 @@ impl Discovery {
                 .into_owned();
             let lower = extension.to_lowercase();
             if PICTURE_EXTENSIONS.contains(&lower.as_str()) {
-                let is_mask = file
-                    .file_stem()
-                    .is_some_and(|stem| stem.eq_ignore_ascii_case("mask"));
-                match &found.mask {
-                    _ if !is_mask => {
-                        let parent = file.parent().unwrap_or(Path::new("")).to_owned();
-                        groups.entry((parent, extension)).or_default().push(file);
-                    }
-                    None => found.mask = Some(file.clone()),
-                    Some(_) => aside.push((file.clone(), "there is another mask".to_owned())),
+                if !is_mask(file) {
+                    let parent = file.parent().unwrap_or(Path::new("")).to_owned();
+                    groups.entry((parent, extension)).or_default().push(file);
+                } else if found.mask.is_none() {
+                    found.mask = Some(file.clone());
+                } else {
+                    aside.push((file.clone(), "there is another mask".to_owned()));
                 }
             } else if VIDEO_EXTENSIONS.contains(&lower.as_str()) {
                 found.videos.push(file.clone());
@@ -203,12 +200,14 @@ impl Discovery {
         self.pictures.first().filter(|_| self.video.is_none())
     }
 
-    /// Decodes a dozen frames of the searched `folder` to find out whether files of 16 bits leave
-    /// the upper bits empty.
+    /// Decodes a dozen frames of the searched `folder`, if the calibration fits them, to find out
+    /// whether files of 16 bits leave the upper bits empty.
     pub fn find_bits(&mut self, folder: &Path) {
         let mask = self.mask.as_ref().map(|mask| folder.join(mask));
-        let frames = self.picture_frames();
-        self.bits = frames.and_then(|group| group.bits(folder, mask.as_deref()));
+        let frames = self.picture_frames().zip(self.calibrations.first());
+        self.bits = frames.and_then(|(group, (_, camera))| {
+            group.bits(folder, mask.as_deref(), (camera.width, camera.height))
+        });
     }
 
     /// The orientation of the frames that the calibration asks for, where their EXIF data name one.
@@ -255,6 +254,12 @@ impl Discovery {
     pub fn truth(&self) -> Option<&(PathBuf, PoseFile)> {
         self.poses.iter().find(|(path, _)| is_truth(path))
     }
+}
+
+/// True if a picture is a mask, by its name.
+fn is_mask(file: &Path) -> bool {
+    file.file_stem()
+        .is_some_and(|stem| stem.eq_ignore_ascii_case("mask"))
 }
 
 /// True if a file may be a calibration, by its name; `extension` is in lower case.

@@ -1,8 +1,8 @@
 //! Groups of pictures in a searched folder.
 
 use crate::frames::{
-    FrameFile, PictureOrientation, PictureReading, StoredFrame, UNUSED_UPPER_BITS, list_frames,
-    used_bits,
+    FrameFile, PictureOrientation, PictureReading, StoredFrame, UNUSED_UPPER_BITS,
+    has_sixteen_bits, list_frames, used_bits,
 };
 use std::path::{Path, PathBuf};
 
@@ -62,14 +62,22 @@ impl PictureGroup {
     }
 
     /// Bits of the values, if the pictures are files of 16 bits whose upper bits are empty, as far
-    /// as a dozen of them show. `folder` is the searched one.
-    pub(super) fn bits(&self, folder: &Path, mask: Option<&Path>) -> Option<u32> {
-        let (width, height) = self.size?;
+    /// as a dozen of them show. `folder` is the searched one, `size` that of the calibration: other
+    /// pictures are not decoded.
+    pub(super) fn bits(&self, folder: &Path, mask: Option<&Path>, size: (u32, u32)) -> Option<u32> {
+        let reading = PictureReading {
+            orientation: self.orientation(size).unwrap_or_default(),
+            ..PictureReading::default()
+        };
         let frames = list_frames(folder, &self.pattern, mask).ok()?;
         let step = frames.len().div_ceil(MAX_DECODED_FRAMES);
-        let used = frames.iter().step_by(step).filter_map(|file| {
-            let frame = StoredFrame::decode(file, width, height).ok()?;
-            used_bits(file, &frame)
+        let used = frames.into_iter().step_by(step).filter_map(|file| {
+            let file = file.with_reading(reading);
+            if !has_sixteen_bits(&file) {
+                return None;
+            }
+            let frame = StoredFrame::decode(&file, size.0, size.1).ok()?;
+            used_bits(&file, &frame)
         });
         used.max().filter(|bits| UNUSED_UPPER_BITS.contains(bits))
     }
@@ -114,7 +122,8 @@ mod tests {
             let files = ["0.png", "1.png", "2.png"].map(PathBuf::from);
             let files: Vec<&PathBuf> = files.iter().collect();
             let group = PictureGroup::of(dir.path(), Path::new(""), "png", &files);
-            group.bits(dir.path(), None)
+            assert_eq!(group.bits(dir.path(), None, (60000, 60000)), None);
+            group.bits(dir.path(), None, (8, 6))
         };
         assert_eq!(bits(4000), Some(12));
         assert_eq!(bits(40000), None);
