@@ -1,7 +1,7 @@
 //! Exposure, noise and texture of a dozen frames.
 
 use super::statistics::median_or_zero;
-use crate::frames::{FrameFile, GreyImage, StoredFrame, colour_type, noise_sigma};
+use crate::frames::{FrameFile, GreyImage, StoredFrame, noise_sigma, used_bits};
 use crate::survey::Survey;
 use serde::Serialize;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -94,14 +94,6 @@ impl PictureCheck {
         };
         (check, faults)
     }
-}
-
-/// Bits of a frame's brightest value, if its file is of 16 bits.
-fn used_bits(file: &FrameFile, frame: &StoredFrame) -> Option<u32> {
-    let colour = colour_type(file).ok()?;
-    let is_deep = colour.bits_per_pixel() == 16 * u16::from(colour.channel_count());
-    let brightest = frame.brightest().filter(|_| is_deep)?;
-    Some(u16::BITS - brightest.leading_zeros())
 }
 
 /// Measures an image; the mask hides a share `hidden` of its pixels, whose values are NaN.

@@ -1,6 +1,7 @@
 //! Warnings of a check, each with its remedy.
 
 use super::result::Check;
+use crate::frames::UNUSED_UPPER_BITS;
 use crate::refine::FittingReadings;
 
 /// Smallest overlap of neighbours, share of a frame, without a warning.
@@ -10,9 +11,6 @@ const MIN_OVERLAP: f64 = 0.25;
 const MAX_JITTER: f64 = 0.25;
 /// Smallest mean grey level without a warning: below it, noise covers the texture.
 const MIN_GREY: f64 = 12.0;
-/// Most bits of the brightest value in files of 16 bits with a warning: cameras of 10 to 14 bits
-/// often leave the upper bits empty.
-const MAX_USED_BITS: u32 = 14;
 /// Largest share of saturated pixels without a warning: more are not specular highlights only.
 const MAX_SATURATED: f64 = 0.2;
 /// Largest 1-σ of a frame's registration, pixels, without a warning.
@@ -86,7 +84,7 @@ fn large_jitter(check: &Check) -> Option<String> {
 
 fn unused_bits(check: &Check) -> Option<String> {
     let bits = check.pictures.used_bits?;
-    (9..=MAX_USED_BITS).contains(&bits).then(|| {
+    UNUSED_UPPER_BITS.contains(&bits).then(|| {
         format!(
             "the frames have files of 16 bits, but no value of more than {bits} bits (mean grey \
              level {:.0} of 255): if the camera delivers {bits} bits, add bits = {bits} under \

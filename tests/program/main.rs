@@ -18,6 +18,7 @@ mod fittings;
 mod fuzzed;
 mod gis;
 mod gyro;
+mod init;
 mod lenses;
 mod locate;
 mod masks;

@@ -1,6 +1,6 @@
 //! Picture files as cameras and computers name and write them.
 
-use crate::support::{edit, first_frames, simulate, succeed, text, tunnelstitch};
+use crate::support::{edit, fail, first_frames, simulate, succeed, text, tunnelstitch};
 use image::{DynamicImage, GrayImage};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -68,6 +68,9 @@ fn twelve_bits_in_sixteen_are_named_and_read() {
     let (_, warnings) = check(&survey);
     assert!(!warnings.contains("bits"), "{warnings}");
     assert!((grey(&survey) - before).abs() < 0.1);
+    succeed(&["init", text(&survey), "--radius-m", "3", "--force"]);
+    let written = std::fs::read_to_string(&file).unwrap();
+    assert!(written.contains("\nbits = 12"), "{written}");
     edit(&file, "bits = 12", "bits = 10");
     let output = tunnelstitch(&["check", text(&survey)]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -113,6 +116,15 @@ fn pictures_are_turned_as_exif_says_if_the_calibration_fits_only_that() {
     let (_, warnings) = check(survey.path());
     assert!(warnings.contains("EXIF orientation (6)") && warnings.contains("which is done"));
     assert_equal(&panorama(survey.path()).into_luma8(), &before);
+    let init = ["init", text(survey.path()), "--radius-m", "3", "--force"];
+    let file = survey.path().join("survey.toml");
+    let given = std::fs::read_to_string(&file).unwrap();
+    succeed(&init);
+    let written = std::fs::read_to_string(&file).unwrap();
+    assert!(written.contains("\norientation = \"exif\""), "{written}");
+    let (_, warnings) = check(survey.path());
+    assert!(!warnings.contains("EXIF"), "{warnings}");
+    std::fs::write(&file, given).unwrap();
     // Upside down, the calibration fits both; the survey says which.
     for path in frames(survey.path()) {
         let upright = image::open(&path).unwrap().rotate90();
@@ -120,9 +132,65 @@ fn pictures_are_turned_as_exif_says_if_the_calibration_fits_only_that() {
     }
     let (_, warnings) = check(survey.path());
     assert!(warnings.contains("which is not done"), "{warnings}");
-    let file = survey.path().join("survey.toml");
     edit(&file, "[frames]", "[frames]\norientation = \"exif\"");
     let (_, warnings) = check(survey.path());
     assert!(!warnings.contains("EXIF"), "{warnings}");
     assert_equal(&panorama(survey.path()).into_luma8(), &before);
+}
+
+/// Frames in formats that are not read are named with the command that converts them.
+#[test]
+fn formats_that_are_not_read_are_named_with_the_conversion() {
+    let survey = first_frames(4);
+    let folder = survey.path().join("frames");
+    let heif = b"\0\0\0\x1cftypheic\0\0\0\0mif1heic";
+    for (extension, content, name, command) in [
+        (
+            "bmp",
+            &b"BM\x7a\xe9\x07\0"[..],
+            "BMP",
+            "mogrify -format png",
+        ),
+        ("heic", heif, "HEIF or AVIF", "heif-convert"),
+        ("dng", DNG, "DNG", "dcraw -T"),
+        ("tif", &float_tiff(), "floating point", "mogrify -depth 16"),
+    ] {
+        for path in frames(survey.path()) {
+            std::fs::remove_file(path).unwrap();
+        }
+        for k in 0..4 {
+            std::fs::write(folder.join(format!("{k:06}.{extension}")), content).unwrap();
+        }
+        let file = survey.path().join("survey.toml");
+        let toml = std::fs::read_to_string(&file).unwrap();
+        let images = toml
+            .lines()
+            .find(|line| line.starts_with("images"))
+            .unwrap();
+        edit(&file, images, &format!("images = \"frames/*.{extension}\""));
+        let said = fail(&["check", text(survey.path())], 3);
+        for part in ["frame 0", "is not read", name, command] {
+            assert!(said.contains(part), "no {part} in {said}");
+        }
+        let pattern = format!("{}/*.{extension}", text(&folder));
+        assert!(said.contains(&pattern), "no {pattern} in {said}");
+        let init = ["init", text(survey.path()), "--radius-m", "3", "--force"];
+        let output = tunnelstitch(&init);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(said.contains(name) && said.contains(command), "{said}");
+    }
+}
+
+/// A TIFF file whose only tag is the version of DNG.
+const DNG: &[u8] = b"II*\0\x08\0\0\0\x01\0\x12\xc6\x01\0\x04\0\0\0\x01\x04\0\0\0\0\0\0";
+
+/// A grey TIFF file of floating point numbers.
+fn float_tiff() -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut encoder = tiff::encoder::TiffEncoder::new(&mut bytes).unwrap();
+    let values = vec![0.5f32; 480 * 360];
+    encoder
+        .write_image::<tiff::encoder::colortype::Gray32Float>(480, 360, &values)
+        .unwrap();
+    bytes.into_inner()
 }

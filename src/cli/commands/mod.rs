@@ -9,6 +9,7 @@ pub mod demo;
 pub mod export;
 pub mod gyro;
 pub mod init;
+mod init_summary;
 pub mod locate;
 pub mod locate_points;
 pub mod overlay;

@@ -46,6 +46,10 @@ impl FrameFile {
         if found == expected {
             return Ok(());
         }
+        if self.unread_format().is_some() {
+            // What was read is a small picture beside the frame.
+            return Err(self.decode_error(String::new()));
+        }
         Err(FrameError::Size {
             index: self.index,
             path: self.path.clone(),

@@ -33,7 +33,7 @@ pub enum FrameError {
         /// The error of the decoder.
         what: String,
         /// The remedy.
-        remedy: &'static str,
+        remedy: String,
     },
     /// A video cannot be read.
     #[error("{}: {what}", printed(path))]

@@ -2,6 +2,7 @@
 
 use super::error::FrameError;
 use super::picture_reading::PictureReading;
+use super::unread_format::UnreadFormat;
 use super::video::Video;
 use alphanumeric_sort::compare_path;
 use image::DynamicImage;
@@ -93,17 +94,30 @@ impl FrameFile {
         matches!(self.source, FrameSource::Video(..))
     }
 
-    /// The error of a frame that cannot be decoded.
+    /// The format of a picture file, if it is one that is not read.
+    pub(super) fn unread_format(&self) -> Option<UnreadFormat> {
+        self.reading().and_then(|_| UnreadFormat::of(&self.path))
+    }
+
+    /// The error of a frame that cannot be decoded; of a format that is not read it names the
+    /// conversion.
     pub(super) fn decode_error(&self, what: String) -> FrameError {
+        let (what, remedy) = match (&self.source, self.unread_format()) {
+            (_, Some(format)) => (
+                format!("{} is not read", format.name()),
+                format.remedy(&self.path),
+            ),
+            (FrameSource::File(_), None) => (what, RESTORE_OR_SKIP.to_owned()),
+            (FrameSource::Video(..), None) => (what, "restore the file".to_owned()),
+            (FrameSource::Memory(_), None) => {
+                (what, "leave out the picture and its pose".to_owned())
+            }
+        };
         FrameError::Decode {
             index: self.index,
             path: self.path.clone(),
             what,
-            remedy: match &self.source {
-                FrameSource::File(_) => RESTORE_OR_SKIP,
-                FrameSource::Video(..) => "restore the file",
-                FrameSource::Memory(_) => "leave out the picture and its pose",
-            },
+            remedy,
         }
     }
 

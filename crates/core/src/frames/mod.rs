@@ -19,6 +19,8 @@ mod pyramid;
 mod shading;
 mod static_pixels;
 mod stored_frame;
+mod unread_format;
+mod used_bits;
 mod video;
 mod windows;
 mod write;
@@ -43,6 +45,8 @@ pub use static_pixels::{
     MotionCell, MotionField, StaticPixels, TemporalStatistics, find_static_pixels,
 };
 pub use stored_frame::StoredFrame;
+pub use unread_format::UnreadFormat;
+pub use used_bits::{UNUSED_UPPER_BITS, has_sixteen_bits, used_bits};
 pub use video::Video;
 pub use write::{
     FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, add_picture, write_picture,

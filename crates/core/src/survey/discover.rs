@@ -1,9 +1,12 @@
 //! Search of a folder for the parts of a survey.
 
 use super::file::SURVEY_FILE;
-use crate::frames::{FrameError, Video, open_picture};
-use image::ImageDecoder;
+use super::left_aside::{LeftAside, reason_by_name, reason_of_text};
+use super::picture_group::PictureGroup;
+use super::straight_axis::{AXIS_FILE, FoundAxis};
+use crate::frames::{FrameError, PictureOrientation, Video};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
 use tunnelstitch_geometry::trajectory::{
@@ -21,17 +24,6 @@ const PICTURE_EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "web
 
 /// Extensions of videos.
 const VIDEO_EXTENSIONS: [&str; 7] = ["mp4", "mov", "m4v", "mkv", "avi", "webm", "mts"];
-
-/// The pictures of one folder with one extension.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PictureGroup {
-    /// Glob pattern, relative to the searched folder.
-    pub pattern: String,
-    /// Number of pictures.
-    pub count: usize,
-    /// Width and height of the first picture, pixels, if readable.
-    pub size: Option<(u32, u32)>,
-}
 
 /// A video whose pictures are the frames.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,6 +54,17 @@ pub struct Discovery {
     /// Pose files; first those with as many poses as frames, and among these first those not named
     /// as ground truth.
     pub poses: Vec<(PathBuf, PoseFile)>,
+    /// The other files and folders, with the reasons.
+    pub left_aside: Vec<LeftAside>,
+    /// Bits of the values in files of 16 bits, if they leave the upper ones empty
+    /// ([`Discovery::find_bits`]).
+    pub bits: Option<u32>,
+    /// Length of a unit of the initial poses, metres, if the user told it
+    /// ([`Discovery::find_axis`]).
+    pub unit_m: Option<f64>,
+    /// The tunnel's axis in the world of the initial poses, if they show that it is not the
+    /// world's y axis ([`Discovery::find_axis`]).
+    pub axis: Option<FoundAxis>,
 }
 
 impl Discovery {
@@ -70,17 +73,13 @@ impl Discovery {
     /// # Errors
     /// A folder that cannot be read.
     pub fn of(folder: &Path) -> std::io::Result<Self> {
-        let mut files = Vec::new();
-        walk(folder, Path::new(""), MAX_DEPTH, &mut files)?;
-        files.sort();
-        let mut groups: BTreeMap<(PathBuf, String), Vec<&PathBuf>> = BTreeMap::new();
+        let mut walked = Walked::default();
+        walk(folder, Path::new(""), MAX_DEPTH, &mut walked)?;
+        walked.files.sort();
+        let mut groups: PictureFiles = BTreeMap::new();
         let mut found = Self::default();
-        // Poses with a time that is there twice are those to associate by time.
-        let options = PoseFileOptions {
-            duplicate_times: DuplicateTimes::Merge,
-            ..PoseFileOptions::default()
-        };
-        for file in &files {
+        let mut aside = walked.unsearched;
+        for file in &walked.files {
             let extension = file
                 .extension()
                 .unwrap_or_default()
@@ -88,54 +87,72 @@ impl Discovery {
                 .into_owned();
             let lower = extension.to_lowercase();
             if PICTURE_EXTENSIONS.contains(&lower.as_str()) {
-                if file
-                    .file_stem()
-                    .is_some_and(|stem| stem.eq_ignore_ascii_case("mask"))
-                {
-                    found.mask.get_or_insert_with(|| file.clone());
-                    continue;
+                if !is_mask(file) {
+                    let parent = file.parent().unwrap_or(Path::new("")).to_owned();
+                    groups.entry((parent, extension)).or_default().push(file);
+                } else if found.mask.is_none() {
+                    found.mask = Some(file.clone());
+                } else {
+                    aside.push((file.clone(), "there is another mask".to_owned()));
                 }
-                let parent = file.parent().unwrap_or(Path::new("")).to_owned();
-                groups.entry((parent, extension)).or_default().push(file);
-                continue;
-            }
-            if VIDEO_EXTENSIONS.contains(&lower.as_str()) {
+            } else if VIDEO_EXTENSIONS.contains(&lower.as_str()) {
                 found.videos.push(file.clone());
-                continue;
-            }
-            let path = folder.join(file);
-            let bytes = path.metadata().map_or(0, |metadata| metadata.len());
-            if file.ends_with(SURVEY_FILE) {
-                continue;
-            }
-            if is_calibration(file, &lower)
-                && bytes <= MAX_CALIBRATION_BYTES
-                && let Ok(camera) = read_calibration(&path, None)
+            } else if !file.ends_with(SURVEY_FILE)
+                && let Err(reason) = found.take_text(folder, file, &lower)
             {
-                found.calibrations.push((file.clone(), camera));
-            }
-            if is_pose_file(file, &lower)
-                && bytes <= MAX_POSES_BYTES
-                && let Ok(poses) = read_poses_with(&path, &options)
-            {
-                found.poses.push((file.clone(), poses));
+                aside.push((file.clone(), reason));
             }
         }
-        found.pictures = groups
-            .into_iter()
-            .map(|((parent, extension), files)| PictureGroup {
-                pattern: parent
-                    .join(format!("*.{extension}"))
-                    .to_string_lossy()
-                    .replace('\\', "/"),
-                count: files.len(),
-                size: open_picture(&folder.join(files[0]))
-                    .map(|decoder| decoder.dimensions())
-                    .ok(),
-            })
-            .collect();
+        found.left_aside = LeftAside::grouped(aside);
+        let group = |((parent, extension), files): (&(PathBuf, String), &Vec<&PathBuf>)| {
+            PictureGroup::of(folder, parent, extension, files)
+        };
+        found.pictures = groups.iter().map(group).collect();
         found.sort();
         Ok(found)
+    }
+
+    /// Takes a file as calibration, as poses or as both.
+    ///
+    /// # Errors
+    /// The reason why it is neither, in words.
+    fn take_text(&mut self, folder: &Path, file: &Path, extension: &str) -> Result<(), String> {
+        let path = folder.join(file);
+        let bytes = path.metadata().map_or(0, |metadata| metadata.len());
+        let mut refusals = Vec::new();
+        let (mut is_tried, mut is_taken) = (false, false);
+        if is_calibration(file, extension) {
+            is_tried = true;
+            match read_up_to(MAX_CALIBRATION_BYTES, bytes, || {
+                read_calibration(&path, None)
+            }) {
+                Ok(camera) => {
+                    is_taken = true;
+                    self.calibrations.push((file.to_owned(), camera));
+                }
+                Err(error) => refusals.push(format!("no calibration: {error}")),
+            }
+        }
+        if is_pose_file(file, extension) {
+            is_tried = true;
+            // Poses with a time that is there twice are those to associate by time.
+            let options = PoseFileOptions {
+                duplicate_times: DuplicateTimes::Merge,
+                ..PoseFileOptions::default()
+            };
+            match read_up_to(MAX_POSES_BYTES, bytes, || read_poses_with(&path, &options)) {
+                Ok(poses) => {
+                    is_taken = true;
+                    self.poses.push((file.to_owned(), poses));
+                }
+                Err(error) => refusals.push(format!("no poses: {error}")),
+            }
+        }
+        match (is_taken, is_tried) {
+            (true, _) => Ok(()),
+            (false, true) => Err(reason_of_text(folder, file, &refusals)),
+            (false, false) => Err(reason_by_name(folder, file, extension)),
+        }
     }
 
     /// Selects every `every`-th picture of a video as the frames; the path is relative to the
@@ -160,6 +177,46 @@ impl Discovery {
         Ok(())
     }
 
+    /// Notes the length of a unit of the initial poses, metres, if it is known, and finds the axis
+    /// of a straight tunnel of that radius, if it is known, for poses of structure from motion.
+    pub fn find_axis(&mut self, unit_m: Option<f64>, radius_m: Option<f64>) {
+        let initial = self.initial();
+        self.axis = initial.and_then(|(_, poses)| FoundAxis::of(poses, unit_m, radius_m));
+        self.unit_m = unit_m;
+        if self.axis.is_some() {
+            // It is written anew.
+            self.left_aside.retain(|aside| aside.pattern != AXIS_FILE);
+        }
+    }
+
+    /// True if the initial poses are in a unit that neither their format nor the user tells.
+    pub fn lacks_scale(&self) -> bool {
+        let initial = self.initial();
+        self.unit_m.is_none() && initial.is_some_and(|(_, poses)| poses.format.has_no_scale())
+    }
+
+    /// The pictures that are the frames, if they are not those of a video.
+    pub fn picture_frames(&self) -> Option<&PictureGroup> {
+        self.pictures.first().filter(|_| self.video.is_none())
+    }
+
+    /// Decodes a dozen frames of the searched `folder`, if the calibration fits them, to find out
+    /// whether files of 16 bits leave the upper bits empty.
+    pub fn find_bits(&mut self, folder: &Path) {
+        let mask = self.mask.as_ref().map(|mask| folder.join(mask));
+        let frames = self.picture_frames().zip(self.calibrations.first());
+        self.bits = frames.and_then(|(group, (_, camera))| {
+            group.bits(folder, mask.as_deref(), (camera.width, camera.height))
+        });
+    }
+
+    /// The orientation of the frames that the calibration asks for, where their EXIF data name one.
+    pub fn orientation(&self) -> Option<PictureOrientation> {
+        let (_, camera) = self.calibrations.first()?;
+        self.picture_frames()?
+            .orientation((camera.width, camera.height))
+    }
+
     /// Number of frames, and their size if known, pixels.
     pub fn frames(&self) -> (usize, Option<(u32, u32)>) {
         let pictures = self.pictures.first();
@@ -173,8 +230,11 @@ impl Discovery {
         self.pictures
             .sort_by_key(|group| std::cmp::Reverse(group.count));
         let (count, size) = self.frames();
-        self.calibrations
-            .sort_by_key(|(_, camera)| Some((camera.width, camera.height)) != size);
+        let turned = self.picture_frames().and_then(|group| group.turned_size);
+        self.calibrations.sort_by_key(|(_, camera)| {
+            let calibrated = Some((camera.width, camera.height));
+            (calibrated != size, calibrated != turned)
+        });
         self.poses.sort_by_key(|(path, poses)| {
             let other_count = poses.entries.len() != count;
             (
@@ -194,6 +254,12 @@ impl Discovery {
     pub fn truth(&self) -> Option<&(PathBuf, PoseFile)> {
         self.poses.iter().find(|(path, _)| is_truth(path))
     }
+}
+
+/// True if a picture is a mask, by its name.
+fn is_mask(file: &Path) -> bool {
+    file.file_stem()
+        .is_some_and(|stem| stem.eq_ignore_ascii_case("mask"))
 }
 
 /// True if a file may be a calibration, by its name; `extension` is in lower case.
@@ -225,19 +291,54 @@ fn is_truth(path: &Path) -> bool {
     words.iter().any(|word| name.contains(word)) || name == "gt" || name.starts_with("gt_")
 }
 
-fn walk(root: &Path, inner: &Path, depth: usize, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+/// The pictures of a folder with an extension.
+type PictureFiles<'a> = BTreeMap<(PathBuf, String), Vec<&'a PathBuf>>;
+
+/// Reads a file of `bytes` bytes, if it is not larger than allowed.
+///
+/// # Errors
+/// The error of reading, or the size, in words.
+fn read_up_to<T, E: Display>(
+    max_bytes: u64,
+    bytes: u64,
+    read: impl FnOnce() -> Result<T, E>,
+) -> Result<T, String> {
+    if bytes > max_bytes {
+        return Err(format!("larger than {} MiB", max_bytes >> 20));
+    }
+    read().map_err(|error| error.to_string())
+}
+
+/// The files below a folder, and what was not searched or cannot be read, with the reasons.
+#[derive(Default)]
+struct Walked {
+    files: Vec<PathBuf>,
+    unsearched: Vec<(PathBuf, String)>,
+}
+
+fn walk(root: &Path, inner: &Path, depth: usize, walked: &mut Walked) -> std::io::Result<()> {
     for entry in std::fs::read_dir(root.join(inner))? {
         let entry = entry?;
         let path = inner.join(entry.file_name());
         if entry.file_name().to_string_lossy().starts_with('.') {
             continue;
         }
-        let kind = root.join(&path).metadata()?;
+        let kind = match root.join(&path).metadata() {
+            Ok(kind) => kind,
+            Err(error) => {
+                walked.unsearched.push((path, error.to_string()));
+                continue;
+            }
+        };
         if kind.is_file() {
-            files.push(path);
+            walked.files.push(path);
         } else if kind.is_dir() && depth > 0 {
-            // Unreadable folders are skipped.
-            let _ = walk(root, &path, depth - 1, files);
+            if let Err(error) = walk(root, &path, depth - 1, walked) {
+                walked.unsearched.push((path, error.to_string()));
+            }
+        } else if kind.is_dir() {
+            let reason = format!("not searched: more than {MAX_DEPTH} folders below");
+            walked.unsearched.push((path, reason));
         }
     }
     Ok(())

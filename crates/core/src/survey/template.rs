@@ -1,16 +1,19 @@
 //! A commented `survey.toml` for the files of a folder.
 
 use super::discover::Discovery;
+use super::straight_axis::AXIS_FILE;
 use std::fmt::Write;
 use std::path::Path;
 use tunnelstitch_geometry::trajectory::PoseFormat;
 
-/// Keys of `[poses]` that are only mentioned, and the table `[prior]`.
-const CONVENTIONS_AND_PRIOR: &str = "\
+/// Keys of `[poses]` that are only mentioned.
+const CONVENTIONS: &str = "\
 # convention = \"c2w\"       # or \"w2c\"; each format has its own
 # camera_axes = \"opencv\"   # or \"opengl\"; each format has its own
-# tunnel_frame = \"axis.json\"   # where the tunnel's axis lies, if it is not the poses' y axis
+";
 
+/// The table `[prior]`.
+const PRIOR: &str = "
 [prior]                     # how far off the initial poses may be, 1-σ
 model = \"random-walk\"       # errors add up from frame to frame; or \"independent\"
 rotation_sigma_deg = 2.0    # about each axis
@@ -54,7 +57,9 @@ impl Discovery {
             let path = quoted(path);
             let _ = writeln!(text, "truth = {path}      # only ever used to compare");
         }
-        text += CONVENTIONS_AND_PRIOR;
+        text += CONVENTIONS;
+        self.write_world(&mut text);
+        text += PRIOR;
         text
     }
 
@@ -76,6 +81,7 @@ impl Discovery {
                 quoted(pattern)
             ),
         };
+        self.write_reading(text);
         let _ = match &self.mask {
             Some(mask) => writeln!(
                 text,
@@ -87,6 +93,61 @@ impl Discovery {
                 "# mask = \"mask.png\"    # a picture of the frames' size, black where none of \
                  them shows the wall"
             ),
+        };
+    }
+
+    /// Writes the reading of the pictures that they ask for.
+    fn write_reading(&self, text: &mut String) {
+        if let Some(bits) = self.bits {
+            let _ = writeln!(
+                text,
+                "bits = {bits}    # no value of the 16-bit files has more; take this away if the \
+                 camera delivers 16"
+            );
+        }
+        let names_orientation = self
+            .picture_frames()
+            .is_some_and(|g| g.turned_size.is_some());
+        let _ = match self.orientation() {
+            Some(orientation) => writeln!(
+                text,
+                "orientation = \"{}\"    # EXIF data ask to turn the pictures; the calibration \
+                 fits only this",
+                orientation.name()
+            ),
+            None if names_orientation => writeln!(
+                text,
+                "# orientation = \"exif\"    # EXIF data ask to turn the pictures: if the camera \
+                 was calibrated with turned ones; otherwise \"stored\""
+            ),
+            None => Ok(()),
+        };
+    }
+
+    /// Writes the axis and the unit of the world of the poses.
+    fn write_world(&self, text: &mut String) {
+        let _ = match &self.axis {
+            Some(_) => writeln!(
+                text,
+                "tunnel_frame = \"{AXIS_FILE}\"   # the tunnel's axis: the line of the cameras"
+            ),
+            None => writeln!(
+                text,
+                "# tunnel_frame = \"axis.json\"   # where the tunnel's axis lies, if it is not the \
+                 poses' y axis"
+            ),
+        };
+        let _ = match self.unit_m {
+            Some(unit_m) => writeln!(
+                text,
+                "unit_m = {unit_m:?}    # metres of a unit of the poses"
+            ),
+            None if self.lacks_scale() => writeln!(
+                text,
+                "# unit_m = 1.0    # metres of a unit of the poses, which have no known scale: \
+                 tunnelstitch init --force --unit-m M writes it, and the axis with it"
+            ),
+            None => Ok(()),
         };
     }
 

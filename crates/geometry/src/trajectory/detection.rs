@@ -52,7 +52,8 @@ pub(super) fn detect_format(
             path,
             number,
             format!(
-                "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line) nor a \
+                "in no known format: neither of TUM (`{}`), \
+                 KITTI (`{}`), CSV (`{}` named in the first line) nor a \
                  file of COLMAP, nerfstudio, EuRoC, OpenSfM, Bundler, Meshroom, OpenMVG, \
                  Metashape, RealityCapture or Pix4D; if it is one of them, name it with \
                  --pose-format (poses.format in survey.toml)",

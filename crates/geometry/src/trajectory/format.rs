@@ -55,4 +55,24 @@ impl PoseFormat {
             _ => CameraAxes::OpenCv,
         }
     }
+
+    /// True for the programs of structure from motion, whose world has its origin and axes anywhere
+    /// unless the user has placed it.
+    pub fn has_arbitrary_world(self) -> bool {
+        self.has_no_scale() || matches!(self, Self::Metashape | Self::Realitycapture | Self::Pix4d)
+    }
+
+    /// True for the programs of structure from motion whose unit of length is arbitrary unless the
+    /// user has scaled the model.
+    pub fn has_no_scale(self) -> bool {
+        matches!(
+            self,
+            Self::Colmap
+                | Self::Nerfstudio
+                | Self::Opensfm
+                | Self::Bundler
+                | Self::Meshroom
+                | Self::Openmvg
+        )
+    }
 }

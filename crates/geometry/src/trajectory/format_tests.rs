@@ -550,7 +550,7 @@ fn wrong_lines_are_named_with_the_remedy() {
         ),
         (format!("{ns},0,0,NaN,1,0,0,0\n"), ":1: `NaN` is not finite"),
         // None of them.
-        ("hello\n".into(), ":1: neither of TUM"),
+        ("hello\n".into(), ":1: in no known format: neither of TUM"),
         ("1 2 3\n".into(), "--pose-format"),
     ] {
         let message = read_text(&text).unwrap_err().to_string();

@@ -23,6 +23,8 @@ pub fn run(data: &[u8]) {
         return;
     };
     let (folder, _path) = file(NAMES[usize::from(*first) % NAMES.len()], content);
-    let found = Discovery::of(folder.path()).unwrap();
-    let _ = (found.frames(), found.initial(), found.truth());
+    let mut found = Discovery::of(folder.path()).unwrap();
+    found.find_bits(folder.path());
+    found.find_axis(Some(0.5), Some(3.0));
+    let _ = (found.frames(), found.truth(), found.survey_toml(None));
 }

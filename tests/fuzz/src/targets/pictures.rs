@@ -1,7 +1,7 @@
 //! Pictures as frames and as masks.
 
 use super::super::file;
-use tunnelstitch::frames::{FrameFile, Mask, colour_type, load_colour};
+use tunnelstitch::frames::{FrameFile, Mask, UnreadFormat, colour_type, load_colour};
 
 /// Larger ones only cost time.
 const MAX_PX: u32 = 1 << 16;
@@ -11,6 +11,7 @@ pub fn run(data: &[u8]) {
     let (_folder, path) = file("picture", data);
     let frame = FrameFile::picture(0, path.clone());
     let _ = colour_type(&frame);
+    let _ = UnreadFormat::of(&path).map(|format| format.remedy(&path));
     let Ok((width, height)) = frame.size() else {
         return;
     };

@@ -1,0 +1,130 @@
+//! Files of a folder that are no part of the survey found in it, with the reasons.
+
+use crate::frames::UnreadFormat;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::files::printed;
+use tunnelstitch_geometry::trajectory::read_tunnel_frame;
+
+/// Extensions of pictures in formats that are not read.
+const UNREAD_EXTENSIONS: [&str; 11] = [
+    "bmp", "dib", "pgm", "ppm", "pnm", "jp2", "heic", "heif", "hif", "avif", "dng",
+];
+/// Extensions of files of measured points.
+const POINT_EXTENSIONS: [&str; 3] = ["ply", "las", "laz"];
+
+/// The beginnings of remedies and lists of what is known, which are left out of reasons.
+const REMEDIES: [&str; 3] = [";", ", expected", ": neither of"];
+
+/// A file that is no part of the survey, or several of one kind.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LeftAside {
+    /// The path relative to the searched folder; of several files their pattern.
+    pub pattern: String,
+    /// Number of files.
+    pub count: usize,
+    /// The reason.
+    pub reason: String,
+}
+
+impl LeftAside {
+    /// True for pictures in a format that is not read.
+    pub fn is_unread_picture(&self) -> bool {
+        let extension = Path::new(&self.pattern).extension().unwrap_or_default();
+        let extension = extension.to_string_lossy().to_lowercase();
+        UNREAD_EXTENSIONS.contains(&extension.as_str())
+    }
+
+    /// Files with their reasons; those of one folder with the same extension and reason are one.
+    pub(super) fn grouped(files: Vec<(PathBuf, String)>) -> Vec<Self> {
+        let mut groups: BTreeMap<(PathBuf, String, String), Vec<PathBuf>> = BTreeMap::new();
+        for (file, reason) in files {
+            let folder = file.parent().unwrap_or(Path::new("")).to_owned();
+            let extension = file.extension().unwrap_or_default();
+            let extension = extension.to_string_lossy().into_owned();
+            let group = groups.entry((folder, extension, reason)).or_default();
+            group.push(file);
+        }
+        let group = |((folder, extension, reason), files): ((PathBuf, String, _), Vec<PathBuf>)| {
+            let pattern = match files.as_slice() {
+                [file] => slashed(file),
+                _ if extension.is_empty() => slashed(&folder.join("*")),
+                _ => slashed(&folder.join(format!("*.{extension}"))),
+            };
+            Self {
+                pattern,
+                count: files.len(),
+                reason,
+            }
+        };
+        groups.into_iter().map(group).collect()
+    }
+}
+
+/// The reason why a file is left aside that neither is a picture or a video nor was tried as
+/// calibration or poses. `file` is relative to `folder`, `extension` in lower case.
+pub(super) fn reason_by_name(folder: &Path, file: &Path, extension: &str) -> String {
+    let path = folder.join(file);
+    if UNREAD_EXTENSIONS.contains(&extension)
+        && let Some(format) = UnreadFormat::of(&path)
+    {
+        return format!("{} is not read; {}", format.name(), format.remedy(&path));
+    }
+    if POINT_EXTENSIONS.contains(&extension) {
+        let name = slashed(file);
+        return format!("measured points: points = \"{name}\" under [tunnel] takes them");
+    }
+    match extension {
+        "gcsv" => "a log of a gyro: tunnelstitch gyro makes poses of it".to_owned(),
+        _ => "by its name no file of a survey".to_owned(),
+    }
+}
+
+/// The reason why a file that was tried as calibration or poses is left aside; `refusals` are the
+/// errors of both readers.
+pub(super) fn reason_of_text(folder: &Path, file: &Path, refusals: &[String]) -> String {
+    let path = folder.join(file);
+    if read_tunnel_frame(&path).is_ok() {
+        let name = slashed(file);
+        return format!("a frame of reference: tunnel_frame = \"{name}\" under [poses] takes it");
+    }
+    let own = printed(&path).to_string();
+    let shortened = |text: &String| {
+        let text = text.replace(&format!("{own}: "), "");
+        let text = text.replace(&format!("{own}:"), "line ");
+        let end = REMEDIES.iter().filter_map(|mark| text.find(mark)).min();
+        text[..end.unwrap_or(text.len())].to_owned()
+    };
+    let refusals: Vec<String> = refusals.iter().map(shortened).collect();
+    refusals.join("; ")
+}
+
+/// A relative path with slashes.
+fn slashed(path: &Path) -> String {
+    path.to_string_lossy().replace('\\', "/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_one_kind_and_reason_are_one() {
+        let file = |path: &str, reason: &str| (PathBuf::from(path), reason.to_owned());
+        let files = vec![
+            file("d/2.npy", "a"),
+            file("d/1.npy", "a"),
+            file("d/3.npy", "b"),
+            file("4.npy", "a"),
+            file("README", "a"),
+            file("LICENSE", "a"),
+        ];
+        let grouped = LeftAside::grouped(files);
+        let lines: Vec<(&str, usize)> = (grouped.iter())
+            .map(|group| (group.pattern.as_str(), group.count))
+            .collect();
+        let expected = [("*", 2), ("4.npy", 1), ("d/*.npy", 2), ("d/3.npy", 1)];
+        assert_eq!(lines, expected);
+    }
+}

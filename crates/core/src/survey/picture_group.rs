@@ -1,0 +1,132 @@
+//! Groups of pictures in a searched folder.
+
+use crate::frames::{
+    FrameFile, PictureOrientation, PictureReading, StoredFrame, UNUSED_UPPER_BITS,
+    has_sixteen_bits, list_frames, used_bits,
+};
+use std::path::{Path, PathBuf};
+
+/// Largest number of frames that are decoded.
+const MAX_DECODED_FRAMES: usize = 12;
+
+/// The pictures of one folder with one extension.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PictureGroup {
+    /// Glob pattern, relative to the searched folder.
+    pub pattern: String,
+    /// Number of pictures.
+    pub count: usize,
+    /// Width and height of the first picture, pixels, if readable.
+    pub size: Option<(u32, u32)>,
+    /// Width and height of the first picture when it is turned or mirrored as its EXIF data ask,
+    /// if they do.
+    pub turned_size: Option<(u32, u32)>,
+    /// The reason why the first picture cannot be read, with the remedy.
+    pub fault: Option<String>,
+}
+
+impl PictureGroup {
+    /// The group of the files of a folder's `parent` with an extension; `folder` is the searched
+    /// one, to which paths are relative.
+    pub(super) fn of(folder: &Path, parent: &Path, extension: &str, files: &[&PathBuf]) -> Self {
+        let pattern = parent.join(format!("*.{extension}"));
+        let path = files.first().map(|first| folder.join(first));
+        let first = FrameFile::picture(0, path.unwrap_or_default());
+        let size = first.size();
+        let is_turned = first.exif_orientation().is_ok_and(|named| named.is_some());
+        let exif = PictureReading {
+            orientation: PictureOrientation::Exif,
+            ..PictureReading::default()
+        };
+        Self {
+            pattern: pattern.to_string_lossy().replace('\\', "/"),
+            count: files.len(),
+            fault: size.as_ref().err().map(ToString::to_string),
+            size: size.ok(),
+            turned_size: match is_turned {
+                true => first.with_reading(exif).size().ok(),
+                false => None,
+            },
+        }
+    }
+
+    /// The orientation that a calibration for pictures of `size` asks for, where EXIF data name
+    /// one; None where there are none, or the calibration fits both or neither.
+    pub fn orientation(&self, size: (u32, u32)) -> Option<PictureOrientation> {
+        let turned = self.turned_size?;
+        match (self.size == Some(size), turned == size) {
+            (false, true) => Some(PictureOrientation::Exif),
+            (true, false) => Some(PictureOrientation::Stored),
+            (true, true) | (false, false) => None,
+        }
+    }
+
+    /// Bits of the values, if the pictures are files of 16 bits whose upper bits are empty, as far
+    /// as a dozen of them show. `folder` is the searched one, `size` that of the calibration: other
+    /// pictures are not decoded.
+    pub(super) fn bits(&self, folder: &Path, mask: Option<&Path>, size: (u32, u32)) -> Option<u32> {
+        let reading = PictureReading {
+            orientation: self.orientation(size).unwrap_or_default(),
+            ..PictureReading::default()
+        };
+        let frames = list_frames(folder, &self.pattern, mask).ok()?;
+        let step = frames.len().div_ceil(MAX_DECODED_FRAMES);
+        let used = frames.into_iter().step_by(step).filter_map(|file| {
+            let file = file.with_reading(reading);
+            if !has_sixteen_bits(&file) {
+                return None;
+            }
+            let frame = StoredFrame::decode(&file, size.0, size.1).ok()?;
+            used_bits(&file, &frame)
+        });
+        used.max().filter(|bits| UNUSED_UPPER_BITS.contains(bits))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_calibration_tells_the_orientation() {
+        let group = |turned_size| PictureGroup {
+            pattern: "*.jpg".to_owned(),
+            count: 1,
+            size: Some((64, 48)),
+            turned_size,
+            fault: None,
+        };
+        let quarter = group(Some((48, 64)));
+        assert_eq!(
+            quarter.orientation((48, 64)),
+            Some(PictureOrientation::Exif)
+        );
+        assert_eq!(
+            quarter.orientation((64, 48)),
+            Some(PictureOrientation::Stored)
+        );
+        assert_eq!(quarter.orientation((32, 24)), None);
+        assert_eq!(group(Some((64, 48))).orientation((64, 48)), None);
+        assert_eq!(group(None).orientation((64, 48)), None);
+    }
+
+    #[test]
+    fn empty_upper_bits_are_found() {
+        let dir = tempfile::tempdir().unwrap();
+        let bits = |brightest: u16| {
+            for k in 0..3 {
+                let value = brightest >> k;
+                let picture = image::ImageBuffer::from_pixel(8, 6, image::Luma([value]));
+                picture.save(dir.path().join(format!("{k}.png"))).unwrap();
+            }
+            let files = ["0.png", "1.png", "2.png"].map(PathBuf::from);
+            let files: Vec<&PathBuf> = files.iter().collect();
+            let group = PictureGroup::of(dir.path(), Path::new(""), "png", &files);
+            assert_eq!(group.bits(dir.path(), None, (60000, 60000)), None);
+            group.bits(dir.path(), None, (8, 6))
+        };
+        assert_eq!(bits(4000), Some(12));
+        assert_eq!(bits(40000), None);
+        assert_eq!(bits(200), None);
+    }
+}

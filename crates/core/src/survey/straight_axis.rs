@@ -1,0 +1,184 @@
+//! The tunnel's axis along the straight line of the cameras, for poses of structure from motion.
+//!
+//! Programs of structure from motion place a model anywhere, along any axis. In a straight tunnel,
+//! a camera that moves along it, or that revolves about its axis, tells where the axis is.
+
+use alphanumeric_sort::compare_str;
+use nalgebra::Vector3;
+use tunnelstitch_geometry::trajectory::{
+    Convention, Pose, PoseEntry, PoseFile, StraightPath, TunnelAxis,
+};
+
+/// Name of the file of the tunnel's axis, beside `survey.toml`.
+pub const AXIS_FILE: &str = "axis.json";
+/// Largest angle between the line and the world's y of poses that are in the frame of a tunnel.
+const MAX_TILT_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
+/// Smallest length of the mean of the cameras' upward directions that all point the same way.
+const MIN_MEAN_UP: f64 = 0.9;
+/// Smallest sine of the angle between the cameras' upward direction and the axis.
+const MIN_UP_SINE: f64 = 0.5;
+
+/// A tunnel's axis, found in the poses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundAxis {
+    /// The axis, metres.
+    pub axis: TunnelAxis,
+    /// The line through the camera centres, in the unit of the poses.
+    pub path: StraightPath,
+    /// Number of the poses.
+    pub poses: usize,
+}
+
+impl FoundAxis {
+    /// The tunnel's axis if poses are of structure from motion and on a straight line that is not
+    /// the world's y axis already. `unit_m` is the length of a unit of the poses, metres, 1 if it
+    /// is not known; `radius_m` the tunnel's radius, if it is known.
+    pub(super) fn of(file: &PoseFile, unit_m: Option<f64>, radius_m: Option<f64>) -> Option<Self> {
+        if !file.format.has_arbitrary_world() {
+            return None;
+        }
+        let has_scale = unit_m.is_some() || !file.format.has_no_scale();
+        let unit_m = unit_m.unwrap_or(1.0);
+        let poses = world_poses(file);
+        let found = Self::along(&poses, unit_m)?;
+        let is_inside = |distance: f64| radius_m.is_none_or(|r| distance * unit_m < r);
+        let off_y = poses.iter().map(|pose| pose.t_wc.xz().norm());
+        let is_in_tunnel = found.path.direction.y.abs() > MAX_TILT_RAD.cos()
+            && is_inside(off_y.fold(0.0, f64::max));
+        let is_possible = !has_scale || is_inside(found.path.max_distance);
+        (!is_in_tunnel && is_possible).then_some(found)
+    }
+
+    /// The axis along the line through poses in their order; chainage 0 is at the first one.
+    fn along(poses: &[Pose], unit_m: f64) -> Option<Self> {
+        let centres: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.t_wc).collect();
+        let path = StraightPath::of(&centres)?;
+        Some(Self {
+            axis: TunnelAxis {
+                point_m: rounded(path.start * unit_m),
+                axis: rounded(path.direction),
+                theta_zero: upward(poses, &path.direction).map(rounded),
+            },
+            path,
+            poses: poses.len(),
+        })
+    }
+}
+
+/// The poses of a file in its world, camera to world, in the order of their frames' names.
+fn world_poses(file: &PoseFile) -> Vec<Pose> {
+    let mut entries: Vec<&PoseEntry> = file.entries.iter().collect();
+    if file.has_names() {
+        let name = |entry: &&PoseEntry| entry.name.clone().unwrap_or_default();
+        entries.sort_by(|a, b| compare_str(name(a), name(b)));
+    }
+    let convention = Convention::of(file.format);
+    let in_world = |entry: &&PoseEntry| convention.to_world(&entry.pose);
+    entries.iter().map(in_world).collect()
+}
+
+/// The mean direction of the upper edges of the pictures, if they agree and are not along the axis.
+fn upward(poses: &[Pose], axis: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let sum: Vector3<f64> = poses.iter().map(|pose| pose.r_wc * -Vector3::y()).sum();
+    let mean = sum / poses.len() as f64;
+    let is_clear = mean.norm() > MIN_MEAN_UP && mean.cross(axis).norm() > MIN_UP_SINE;
+    is_clear.then(|| mean.normalize())
+}
+
+/// Coordinates to a millionth; no negative zero.
+fn rounded(v: Vector3<f64>) -> [f64; 3] {
+    let digits = |value: f64| (value * 1e6).round() / 1e6 + 0.0;
+    [digits(v.x), digits(v.y), digits(v.z)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::survey::discover::Discovery;
+    use nalgebra::UnitQuaternion;
+    use std::path::Path;
+    use tunnelstitch_geometry::trajectory::{CameraAxes, PoseFormat, spiral};
+
+    /// Poses of nerfstudio: a camera that looks along the tunnel, which lies anywhere.
+    fn elsewhere(frame: &Pose, scale: f64) -> PoseFile {
+        let turn = UnitQuaternion::from_scaled_axis(-Vector3::x() * std::f64::consts::FRAC_PI_2);
+        let entry = |k: u32| {
+            let sway = 0.002 * f64::from(k % 3);
+            let centre = Vector3::new(sway, 0.1 * f64::from(k), 0.0);
+            let pose = frame.after(&Pose::new(turn, centre));
+            PoseEntry {
+                name: Some(format!("f{k}.png")),
+                time_s: None,
+                pose: CameraAxes::OpenGl.turn(&Pose::new(pose.r_wc, pose.t_wc * scale)),
+            }
+        };
+        PoseFile {
+            path: "transforms.json".into(),
+            format: PoseFormat::Nerfstudio,
+            // As some programs write them: in no order.
+            entries: (0..30).rev().map(entry).collect(),
+            conflicts: Vec::new(),
+        }
+    }
+
+    fn found(poses: PoseFile, unit_m: Option<f64>, radius_m: Option<f64>) -> Discovery {
+        let mut found = Discovery {
+            poses: vec![(Path::new("transforms.json").into(), poses)],
+            ..Discovery::default()
+        };
+        found.find_axis(unit_m, radius_m);
+        found
+    }
+
+    #[test]
+    fn the_line_of_the_cameras_is_the_axis() {
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.7, -1.1, 2.0));
+        let frame = Pose::new(rotation, Vector3::new(5.0, -3.0, 2.0));
+        let discovery = found(elsewhere(&frame, 4.0), Some(0.25), Some(0.15));
+        let axis = discovery.axis.clone().unwrap().axis;
+        let mended = frame.inverse().after(&axis.frame().unwrap());
+        // θ = 0 is up: the camera's upper edge, the tunnel's z.
+        assert!(mended.r_wc.angle() < 1e-3, "{mended:?}");
+        assert!(mended.t_wc.norm() < 0.005, "{mended:?}");
+        let text = discovery.survey_toml(Some(0.15));
+        assert!(
+            text.contains("\ntunnel_frame = \"axis.json\"") && text.contains("\nunit_m = 0.25")
+        );
+        assert!(!discovery.lacks_scale());
+    }
+
+    #[test]
+    fn without_a_scale_the_axis_is_in_units_of_the_poses() {
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.7, -1.1, 2.0));
+        let frame = Pose::new(rotation, Vector3::new(5.0, -3.0, 2.0));
+        let poses = elsewhere(&frame, 400.0);
+        let discovery = found(poses.clone(), None, Some(0.15));
+        assert!(discovery.lacks_scale() && discovery.axis.is_some());
+        assert!(discovery.survey_toml(None).contains("# unit_m"));
+        // With a unit, cameras outside of the tunnel show that the line is not the axis.
+        assert_eq!(found(poses, Some(1.0), Some(0.15)).axis, None);
+    }
+
+    /// Poses in a tunnel's frame, of a format that has its own world, and on no line.
+    #[test]
+    fn other_poses_stay_as_they_are() {
+        let in_tunnel = elsewhere(&Pose::identity(), 1.0);
+        assert_eq!(found(in_tunnel.clone(), None, Some(0.15)).axis, None);
+        let aside = Pose::new(UnitQuaternion::identity(), Vector3::x());
+        assert!(
+            found(elsewhere(&aside, 1.0), None, Some(0.15))
+                .axis
+                .is_some()
+        );
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::x());
+        let mut tum = elsewhere(&Pose::new(rotation, Vector3::zeros()), 1.0);
+        tum.format = PoseFormat::Tum;
+        assert_eq!(found(tum, None, None).axis, None);
+        let mut revolving = in_tunnel;
+        for (entry, pose) in revolving.entries.iter_mut().zip(spiral(30, 0.1, 0.5)) {
+            let arm = pose.r_wc * Vector3::z();
+            entry.pose = Pose::new(pose.r_wc, pose.t_wc.zxy() + arm.zxy());
+        }
+        assert_eq!(found(revolving, None, None).axis, None);
+    }
+}
