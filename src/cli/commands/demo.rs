@@ -2,8 +2,8 @@
 
 use super::compare::stage_comparison;
 use super::overlay::leave_out_overlay;
-use super::refine::print_summary;
 use super::refine_files::stage_refined;
+use super::refine_summary::print_summary;
 use super::report::stage_report;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::{Comparison, compare_survey};
@@ -94,7 +94,7 @@ pub fn run(
         stage_refined(&survey, &overlay, &options, out, record, None, terminal)?;
     outputs.commit()?;
     if !terminal.is_json() {
-        print_summary(&refined, terminal);
+        print_summary(&refined.report, false, terminal);
     }
 
     let poses = folders.refined.join("poses.tum");

@@ -1,6 +1,7 @@
 //! Output that commands share: texts on the terminal, JSON, failures with their exit codes, and the
 //! record of a run beside its results.
 
+mod duration;
 mod failure;
 mod failure_output;
 pub mod json;
@@ -11,6 +12,7 @@ mod stream;
 mod suggestion;
 mod terminal;
 
+pub use duration::duration_text;
 pub use failure::Failure;
 pub use failure_output::{print_failure, print_failures_as_json, refused_arguments};
 pub use paths::{create_parent_folder, picture_format, refuse_overwriting, survey_files};
