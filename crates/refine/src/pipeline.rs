@@ -35,6 +35,17 @@ pub fn refine<'a>(
     refine_with_checkpoint(input, options, None, progress)
 }
 
+/// Checks input and options as [`refine`] does before it decodes a frame.
+///
+/// # Errors
+/// [`RefineError`].
+pub fn check_input<'a>(
+    input: impl Into<RefineInput<'a>>,
+    options: &RefineOptions,
+) -> Result<(), RefineError> {
+    Setup::new(input.into(), options).map(drop)
+}
+
 /// Refines the poses of frames, with snapshots kept in a checkpoint; resumes from the snapshot that
 /// is in it.
 ///

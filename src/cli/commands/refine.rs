@@ -1,18 +1,23 @@
 //! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
 
+use crate::check::{refine_bytes, refine_s};
 use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
 use crate::cli::commands::overlay::leave_out_overlay;
-use crate::cli::commands::refine_files::stage_refined;
+use crate::cli::commands::refine_files::{
+    FOUND_FILES, REFINED_FILES, check_outputs, stage_refined,
+};
 use crate::cli::commands::refine_memory::check_memory;
 use crate::cli::commands::refine_summary::{print_outputs, print_summary};
-use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
-use crate::persist::atomic;
+use crate::cli::output::{
+    DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
+};
 use crate::progress::Progress;
 use crate::refine::{
-    FrameFlag, Photometry, RefineOptions, RefineReport, ShapeMode, search_readings,
+    FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, WallPoints,
+    check_input, search_readings,
 };
 use crate::survey::{CalibrationGroup, Survey};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Refines the poses of a survey by photometric bundle adjustment.
@@ -102,6 +107,8 @@ pub struct RefineArguments {
     reading: PoseReadingArguments,
     #[command(flatten)]
     resume: ResumeArguments,
+    #[command(flatten)]
+    dry_run: DryRunArguments,
 }
 
 /// Names of modes for `--shape`.
@@ -186,11 +193,14 @@ pub fn run(
     let options = arguments.options();
     let points = arguments.points.as_deref();
     let mut survey = (arguments.reading).open(&arguments.survey, points, terminal)?;
+    check_outputs(&survey, &arguments.out)?;
+    check_memory(&survey)?;
+    if arguments.dry_run.is_set() {
+        return describe(&survey, &options, &arguments.out)?.print(terminal);
+    }
     let inputs = record::hash_survey(&survey, None)?;
     let origin = resume::origin(&survey, &options, inputs.clone())?;
     let say = |text: &str| terminal.say(text);
-    check_memory(&survey)?;
-    atomic::create_folder(&arguments.out)?;
     let result = arguments.out.join("refine");
     let (report, json, files) = arguments.resume.run(&result, &origin, say, |checkpoint| {
         // After the check that the run to be continued is of the same frames.
@@ -226,6 +236,27 @@ pub fn run(
         print_outputs(&report, &arguments.out, &files, terminal);
     }
     conclude(arguments, &report, terminal)
+}
+
+/// The work of a refinement into `out`, which is checked as far as is possible without frames.
+///
+/// # Errors
+/// Poses, options or measured points that cannot be refined.
+fn describe(survey: &Survey, options: &RefineOptions, out: &Path) -> Result<Job, Failure> {
+    let points = WallPoints::of_survey(survey)?;
+    let input = RefineInput {
+        points: points.as_ref(),
+        ..RefineInput::from(survey)
+    };
+    check_input(input, options)?;
+    let path = |name: &&str| out.join(name);
+    Ok(Job {
+        writes: REFINED_FILES.iter().map(path).collect(),
+        may_write: FOUND_FILES.iter().map(path).collect(),
+        memory_bytes: Some(refine_bytes(survey)),
+        time_s: Some(refine_s(survey, options)),
+        ..Job::of(survey, None)
+    })
 }
 
 /// Says in one sentence whether the result may be used; fails if it may not, or if fewer frames are
