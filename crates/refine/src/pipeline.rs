@@ -72,6 +72,7 @@ pub fn refine_with_checkpoint<'a>(
         if estimation.solution.is_none() {
             session.keep_if_due(&setup, || estimation.state.clone())?;
         }
+        session.enter_stage(&setup, &estimation.state);
         let ended = match run_stage(stage, &setup, estimation, &mut session) {
             Ok(estimation) => Some(estimation),
             Err(RefineError::Problem(ProblemError::Factor { .. })) => None,
@@ -85,9 +86,13 @@ pub fn refine_with_checkpoint<'a>(
             }
             Some(ended) => ended.without_first_stage(),
             // Poses that nothing determines are those given.
-            None => return Ok(without_solution(&setup, &mut session)),
+            None => {
+                session.progress.leave_job();
+                return Ok(without_solution(&setup, &mut session));
+            }
         };
     }
+    session.progress.leave_job();
     estimation.refined.ok_or(RefineError::NoOverlap)
 }
 
@@ -124,6 +129,7 @@ fn begin(setup: &Setup) -> PipelineState {
     };
     PipelineState {
         stages: plan_stages(setup.options, setup.handover_level()),
+        over: Vec::new(),
         noise: 0.0,
         has_common_light: true,
         dispersion: 1.0,

@@ -5,6 +5,7 @@ mod dry_run;
 mod duration;
 mod failure;
 mod failure_output;
+mod job_clock;
 pub mod json;
 mod label;
 mod paths;
