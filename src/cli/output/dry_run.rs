@@ -1,4 +1,4 @@
-//! What a command would do, for `--dry-run`.
+//! The work of a command in words, for `--dry-run`, which does not do it.
 
 use super::duration::duration_text;
 use super::failure::Failure;

@@ -70,7 +70,7 @@ impl JobClock {
         }
         let done = before + fraction * share;
         let pace_s = (before_s + within_s) / done;
-        (done >= MIN_SHARE).then(|| pace_s * (later + (1.0 - fraction) * share))
+        (done >= MIN_SHARE).then_some(pace_s * (later + (1.0 - fraction) * share))
     }
 }
 
