@@ -13,6 +13,8 @@ const TIME_PER_PIXEL_S: f64 = 0.14e-6;
 /// surveys of 320 × 240 px with 1-σ from 5° to 20°; the search is at a resolution of its own, so
 /// that the time does not depend on the size of the frames.
 const TIME_PER_SEARCH_S: f64 = 4e-4;
+/// Time with the wall solved jointly, relative to the time without: between ten and twenty.
+const JOINT_FACTOR: f64 = 15.0;
 /// Memory of a frame's pyramid per pixel, bytes.
 const PYRAMID_BYTES_PER_PIXEL: f64 = 6.0;
 /// Memory of the normal equations per frame, bytes.
@@ -33,21 +35,15 @@ pub struct Effort {
 impl Effort {
     /// Estimates the effort from the number and the size of the frames.
     pub(super) fn of(survey: &Survey, px_per_metre: f64) -> Self {
-        let frames = survey.frames.len() as f64;
-        let pixels = f64::from(survey.camera.width) * f64::from(survey.camera.height);
         let poses = || survey.initial.iter().map(|stamped| stamped.pose.t_wc);
         let chainage = || poses().map(|t_wc| survey.surface.chainage_m(&t_wc));
         let from_m = chainage().fold(f64::INFINITY, f64::min);
         let to_m = chainage().fold(f64::NEG_INFINITY, f64::max);
-        let radius_m = survey.file.tunnel.nominal_m();
-        let volume_deg3 = survey.prior.search_volume_deg3(radius_m);
         // The panorama extends by half a frame beyond the first and the last camera.
         let frame_m = f64::from(survey.camera.height) / px_per_metre;
         let px = |metres: f64| (metres * px_per_metre).max(0.0) as u64;
         Self {
-            refine_s: frames
-                * (TIME_PER_FRAME_S + TIME_PER_PIXEL_S * pixels + TIME_PER_SEARCH_S * volume_deg3)
-                / rayon::current_num_threads() as f64,
+            refine_s: refine_s(survey, &RefineOptions::default()),
             refine_bytes: refine_bytes(survey),
             panorama_px: [
                 px(survey.surface.perimeter_m()),
@@ -55,6 +51,18 @@ impl Effort {
             ],
         }
     }
+}
+
+/// Time of refine on all cores of this machine, seconds, within a factor of two or three.
+pub fn refine_s(survey: &Survey, options: &RefineOptions) -> f64 {
+    let frames = survey.frames.len() as f64;
+    let pixels = f64::from(survey.camera.width) * f64::from(survey.camera.height);
+    let radius_m = survey.file.tunnel.nominal_m();
+    let volume_deg3 = survey.prior.search_volume_deg3(radius_m);
+    let search_s = TIME_PER_SEARCH_S * volume_deg3;
+    let factor = if options.joint { JOINT_FACTOR } else { 1.0 };
+    frames * factor * (TIME_PER_FRAME_S + TIME_PER_PIXEL_S * pixels + search_s)
+        / rayon::current_num_threads() as f64
 }
 
 /// Memory of refine, bytes, beside what the program takes for any survey.

@@ -23,7 +23,7 @@ mod run;
 mod statistics;
 mod warnings;
 
-pub use effort::{Effort, refine_bytes};
+pub use effort::{Effort, refine_bytes, refine_s};
 pub use interlacing::interlacing_warning;
 pub use jitter::JitterCheck;
 pub use masks::MaskCheck;

@@ -4,7 +4,7 @@ use super::error::InspectError;
 use super::glb_target::GlbTarget;
 use super::layers::{PosedLayer, TextureOptions, draw_layers, lay_out_texture};
 use super::marks::{MARKS_CSV, MARKS_GEOJSON};
-use super::tiles_target::TilesFolder;
+use super::tiles_target::{TilesFolder, TilesTarget};
 use super::viewer::Viewer;
 use crate::persist::atomic::{OutputSet, StagedFolder, WriteError};
 use crate::progress::Progress;
@@ -20,6 +20,43 @@ pub struct ExportFiles<'a> {
     pub glb: Option<&'a Path>,
     /// A folder of 3D Tiles.
     pub tiles: Option<&'a Path>,
+}
+
+/// The panorama of a textured wall before it is drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct WallPlan {
+    /// Its canvas.
+    pub canvas: Canvas,
+    /// Memory that drawing takes at most, bytes.
+    pub memory_bytes: u64,
+}
+
+/// Lays out what [`stage_wall`] draws, and checks it as far as is possible without frames.
+///
+/// # Errors
+/// Poses that cannot be placed on the wall, too little memory.
+pub fn plan_wall(
+    survey: &Survey,
+    poses: &[Pose],
+    options: &TextureOptions,
+    files: ExportFiles,
+) -> Result<WallPlan, InspectError> {
+    let stitch = lay_out_texture(survey, poses, &survey.shutter(), options)?;
+    let (canvas, format) = (*stitch.canvas(), stitch.frames().format());
+    let single_bytes = match files.glb {
+        Some(_) => GlbTarget::bytes_for(&canvas, format)?,
+        None => 0,
+    };
+    let tiles_bytes = match files.tiles {
+        Some(_) => TilesTarget::bytes_for(&canvas, format)?,
+        None => 0,
+    };
+    let budget = stitch.budget(single_bytes + tiles_bytes)?;
+    let frames_bytes = stitch.frames().frame_bytes() * survey.frames.len() as u64;
+    Ok(WallPlan {
+        canvas,
+        memory_bytes: budget.most(frames_bytes),
+    })
 }
 
 /// Draws the panorama of `poses` as textured mesh in `files`, which are added to a set of outputs;

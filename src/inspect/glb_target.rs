@@ -49,6 +49,14 @@ impl<'a> GlbTarget<'a> {
         })
     }
 
+    /// Maximum memory of a target for `canvas`, besides the compressed textures, bytes.
+    ///
+    /// # Errors
+    /// [`RasterError`] for a canvas that cannot be a raster.
+    pub fn bytes_for(canvas: &Canvas, format: PixelFormat) -> Result<u64, RasterError> {
+        Ok(BlockCutter::single(canvas, format, TILES_PER_SIDE)?.max_bytes())
+    }
+
     /// Maximum memory besides the compressed textures, bytes.
     pub fn max_bytes(&self) -> u64 {
         self.cutter.max_bytes()

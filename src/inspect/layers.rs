@@ -65,6 +65,31 @@ pub(super) fn lay_out_texture<'a>(
     lay_out(Some(tiles_px_per_metre(surface, px_per_metre)))
 }
 
+/// Lays out what [`draw_layers`] draws, and checks it as far as is possible without frames; returns
+/// the memory that drawing takes at most, bytes.
+///
+/// # Errors
+/// Poses that cannot be placed on the wall, too little memory.
+pub fn plan_layers(
+    survey: &Survey,
+    layers: &[PosedLayer],
+    options: &TextureOptions,
+) -> Result<u64, InspectError> {
+    let mut most_bytes = 0;
+    let mut has_deformation = DeviationMap::of_survey(survey)?.is_some();
+    for layer in layers {
+        let stitch = lay_out_texture(survey, &layer.poses, &layer.shutter, options)?;
+        let (canvas, frames) = (stitch.canvas(), stitch.frames());
+        let mut target_bytes = TilesTarget::bytes_for(canvas, frames.format())?;
+        if std::mem::take(&mut has_deformation) {
+            target_bytes += TilesTarget::bytes_for(canvas, FORMAT)?;
+        }
+        let frames_bytes = frames.frame_bytes() * survey.frames.len() as u64;
+        most_bytes = most_bytes.max(stitch.budget(target_bytes)?.most(frames_bytes));
+    }
+    Ok(most_bytes)
+}
+
 /// Draws all layers into `folder` and writes the manifest beside them.
 ///
 /// # Errors

@@ -51,10 +51,10 @@ mod viewer;
 
 pub use deformation_layer::DEFORMATION_LAYER;
 pub use error::InspectError;
-pub use export::{ExportFiles, stage_page, stage_wall};
+pub use export::{ExportFiles, WallPlan, plan_wall, stage_page, stage_wall};
 pub use glb_target::GlbTarget;
 pub use layer_values::LayerValues;
-pub use layers::{PosedLayer, TextureOptions, draw_layers, pose_source_frames};
+pub use layers::{PosedLayer, TextureOptions, draw_layers, plan_layers, pose_source_frames};
 pub use manifest::{MANIFEST, Manifest, MapImages, PanoramaLayer, WALL, WallPoints};
 pub use mark::{Geometry, Mark, MarkVersions, Properties};
 pub use marks::{MARKS_CSV, MARKS_GEOJSON, Marks};

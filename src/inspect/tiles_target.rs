@@ -83,6 +83,14 @@ impl<'a> TilesTarget<'a> {
         Ok(MapImages::new(canvas, level))
     }
 
+    /// Maximum memory of a target for `canvas`, bytes.
+    ///
+    /// # Errors
+    /// [`RasterError`] for a canvas that cannot be a raster.
+    pub fn bytes_for(canvas: &Canvas, format: PixelFormat) -> Result<u64, RasterError> {
+        Ok(BlockCutter::pyramid(canvas, format)?.max_bytes())
+    }
+
     /// Maximum memory of the target, bytes.
     pub fn max_bytes(&self) -> u64 {
         self.cutter.max_bytes()

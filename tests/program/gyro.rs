@@ -233,6 +233,21 @@ fn the_clock_is_found_by_the_plan() {
     assert!(poses[29].r_wc.angle_to(&truth[29].r_wc) < 3.0 * sigma);
     assert!((poses[29].t_wc.y - 1.45).abs() < 1e-9);
 
+    // Rates in radians that the header takes for degrees turn by a 57th of the plan.
+    let wrong = dir.path().join("wrong.gcsv");
+    let scaled = std::fs::read_to_string(&log).unwrap();
+    let scaled = scaled.replace("gscale,0.0001", "gscale,1.7453292519943295e-6");
+    std::fs::write(&wrong, scaled).unwrap();
+    let frames = ["--frames", "30", "--fps", "1", "--time-offset-s", "4"];
+    let plan = ["--table", text(&table), "--out", text(&out)];
+    let output = tunnelstitch(&[&["gyro", text(&wrong)], &frames[..], &plan[..]].concat());
+    let warned = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{warned}");
+    assert!(
+        warned.contains("write into its header: gscale,1.000000e-4"),
+        "{warned}"
+    );
+
     // The sensor given by a matrix from its axes to the camera's, and a reflected one.
     let mount = dir.path().join("mount.txt");
     std::fs::write(&mount, "1 0 0 0\n0 -1 0 0\n0 0 -1 0\n0 0 0 1\n").unwrap();

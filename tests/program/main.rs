@@ -11,6 +11,7 @@ mod command_line;
 mod compare;
 mod config;
 mod converge;
+mod dry_run;
 mod exit_codes;
 mod export;
 mod faults;

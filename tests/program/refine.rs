@@ -313,3 +313,28 @@ fn a_smooth_wall_is_refined_without_joint_estimation() {
         assert!(plain == joint, "{file} is different");
     }
 }
+
+/// The summary is short; the table of solves and the times of stages are for `-v`.
+#[test]
+fn tables_of_the_estimator_are_printed_with_verbose() {
+    let survey = first_frames(6);
+    let out = survey.path().join("out");
+    let refine = ["refine", text(survey.path()), "--out", text(&out)];
+    let short = succeed(&refine);
+    let long = succeed(&[&refine[..], &["-v"]].concat());
+    assert!(short.contains("\nrefined 6 frames in "), "{short}");
+    for part in [
+        " of 6 frames are photometric; mean 1-σ on the wall",
+        ": poses.tum, refine.json, covariance.csv, ",
+        "run.toml\nthe result may be used",
+    ] {
+        assert!(
+            short.contains(part) && long.contains(part),
+            "{part}: {short}"
+        );
+    }
+    for table in ["observations  noise (grey)", "  stopped: ", "  decode "] {
+        assert!(!short.contains(table), "{short}");
+        assert!(long.contains(table), "{table}: {long}");
+    }
+}

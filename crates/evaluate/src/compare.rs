@@ -14,9 +14,12 @@ use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 use tunnelstitch_render::{
-    Canvas, Panorama, PictureCache, Placement, RenderOptions, check_memory, level_for,
+    Canvas, Panorama, PictureCache, Placement, RenderError, RenderOptions, check_memory, level_for,
     native_px_per_metre, place_frames, render,
 };
+
+/// Panoramas in memory at once: three, and one on its way to the file.
+const PANORAMAS: u64 = 4;
 
 /// Input of a comparison.
 #[derive(Clone, Copy, Debug)]
@@ -108,21 +111,14 @@ pub fn compare(
     input: &CompareInput,
     progress: &dyn Progress,
 ) -> Result<(Comparison, ComparedPanoramas), EvaluateError> {
-    for poses in [Some(input.initial), Some(input.refined), input.truth] {
-        check_pairs(
-            poses.map_or(input.files.len(), <[Pose]>::len),
-            input.files.len(),
-        )?;
-    }
-    let baseline = PlacedPoses::new("initial", input, input.initial)?;
-    let refined = PlacedPoses::new("refined", input, input.refined)?;
-    let truth = match input.truth {
-        Some(poses) => Some(PlacedPoses::new("true", input, poses)?),
-        None => None,
-    };
-    let (mut frames, canvas) = prepare(input, &baseline, &refined, truth.as_ref(), progress)?;
+    let candidates = Candidates::new(input)?;
+    let LaidOut {
+        mut frames, canvas, ..
+    } = candidates.lay_out(input)?;
+    let loaded = frames.load_all(progress);
+    loaded.map_err(|source| candidates.fail(source))?;
 
-    let true_panorama = match &truth {
+    let true_panorama = match &candidates.truth {
         Some(truth) => Some(truth.render(input, &mut frames, &canvas, progress)?),
         None => None,
     };
@@ -142,8 +138,8 @@ pub fn compare(
         }
         Ok((scores, compared))
     };
-    let (baseline_scores, baseline_panorama) = score(&baseline)?;
-    let (refined_scores, refined_panorama) = score(&refined)?;
+    let (baseline_scores, baseline_panorama) = score(&candidates.baseline)?;
+    let (refined_scores, refined_panorama) = score(&candidates.refined)?;
     Ok((
         Comparison {
             frames: input.files.len(),
@@ -158,6 +154,27 @@ pub fn compare(
             truth: true_panorama,
         },
     ))
+}
+
+/// The panoramas of a comparison before they are drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct ComparisonPlan {
+    /// The canvas of all panoramas.
+    pub canvas: Canvas,
+    /// Memory of panoramas and frames, bytes.
+    pub memory_bytes: u64,
+}
+
+/// Lays out what [`compare`] draws, and checks it before a frame is decoded.
+///
+/// # Errors
+/// The errors of [`compare`], as far as they are known by then.
+pub fn plan_comparison(input: &CompareInput) -> Result<ComparisonPlan, EvaluateError> {
+    let laid_out = Candidates::new(input)?.lay_out(input)?;
+    Ok(ComparisonPlan {
+        canvas: laid_out.canvas,
+        memory_bytes: laid_out.memory_bytes,
+    })
 }
 
 impl Scores {
@@ -228,34 +245,77 @@ impl<'a> PlacedPoses<'a> {
     }
 }
 
-/// Loads the frames and computes the canvas that holds all footprints.
-fn prepare(
-    input: &CompareInput,
-    baseline: &PlacedPoses,
-    refined: &PlacedPoses,
-    truth: Option<&PlacedPoses>,
-    progress: &dyn Progress,
-) -> Result<(PictureCache, Canvas), EvaluateError> {
-    let best = truth.unwrap_or(refined);
-    let fail = |source| EvaluateError::Render {
-        which: best.which,
-        source,
-    };
-    let native = native_px_per_metre(input.surface, input.camera, best.given).map_err(fail)?;
-    let placements = [Some(baseline), Some(refined), truth]
+/// All sets of poses of a comparison, placed on the wall.
+struct Candidates<'a> {
+    baseline: PlacedPoses<'a>,
+    refined: PlacedPoses<'a>,
+    truth: Option<PlacedPoses<'a>>,
+}
+
+/// A comparison before a frame is decoded.
+struct LaidOut {
+    frames: PictureCache,
+    canvas: Canvas,
+    memory_bytes: u64,
+}
+
+impl<'a> Candidates<'a> {
+    fn new(input: &CompareInput<'a>) -> Result<Self, EvaluateError> {
+        for poses in [Some(input.initial), Some(input.refined), input.truth] {
+            check_pairs(
+                poses.map_or(input.files.len(), <[Pose]>::len),
+                input.files.len(),
+            )?;
+        }
+        Ok(Self {
+            baseline: PlacedPoses::new("initial", input, input.initial)?,
+            refined: PlacedPoses::new("refined", input, input.refined)?,
+            truth: match input.truth {
+                Some(poses) => Some(PlacedPoses::new("true", input, poses)?),
+                None => None,
+            },
+        })
+    }
+
+    /// The poses that are nearest to the truth.
+    fn best(&self) -> &PlacedPoses<'a> {
+        self.truth.as_ref().unwrap_or(&self.refined)
+    }
+
+    /// An error of drawing the best poses.
+    fn fail(&self, source: RenderError) -> EvaluateError {
+        EvaluateError::Render {
+            which: self.best().which,
+            source,
+        }
+    }
+
+    /// Opens the frames, computes the canvas that holds all footprints, and checks the memory.
+    fn lay_out(&self, input: &CompareInput) -> Result<LaidOut, EvaluateError> {
+        let fail = |source| self.fail(source);
+        let native =
+            native_px_per_metre(input.surface, input.camera, self.best().given).map_err(fail)?;
+        let placements = [
+            Some(&self.baseline),
+            Some(&self.refined),
+            self.truth.as_ref(),
+        ]
         .into_iter()
         .flatten()
         .flat_map(|candidate| &candidate.placements);
-    let canvas = Canvas::covering(
-        input.surface,
-        placements.map(|placement| &placement.footprint),
-        input.px_per_metre.unwrap_or(native),
-    )
-    .map_err(fail)?;
-    let level = level_for(input.camera, native, canvas.px_per_metre);
-    let copies = 4;
-    let mut frames = PictureCache::open(input.files, input.camera, level).map_err(fail)?;
-    check_memory(&canvas, copies, &frames).map_err(fail)?;
-    frames.load_all(progress).map_err(fail)?;
-    Ok((frames, canvas))
+        let canvas = Canvas::covering(
+            input.surface,
+            placements.map(|placement| &placement.footprint),
+            input.px_per_metre.unwrap_or(native),
+        )
+        .map_err(fail)?;
+        let level = level_for(input.camera, native, canvas.px_per_metre);
+        let frames = PictureCache::open(input.files, input.camera, level).map_err(fail)?;
+        let memory_bytes = check_memory(&canvas, PANORAMAS, &frames).map_err(fail)?;
+        Ok(LaidOut {
+            frames,
+            canvas,
+            memory_bytes,
+        })
+    }
 }

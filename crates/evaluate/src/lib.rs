@@ -50,7 +50,10 @@ mod unaligned_error;
 mod wall_error;
 
 pub use before_after::draw_before_after;
-pub use compare::{CompareInput, ComparedPanorama, ComparedPanoramas, Comparison, Scores, compare};
+pub use compare::{
+    CompareInput, ComparedPanorama, ComparedPanoramas, Comparison, ComparisonPlan, Scores, compare,
+    plan_comparison,
+};
 pub use comparison_table::ComparisonRow;
 pub use error::EvaluateError;
 pub use error_statistics::ErrorStatistics;
@@ -58,7 +61,7 @@ pub use image_metrics::{ImageMetrics, image_metrics};
 pub use mtf::mtf50;
 pub use normalised_errors::{gauge_fixed_errors, normalised_errors_squared};
 pub use seam_residual::{SeamMap, SeamResidual, seam_residual};
-pub use survey::compare_survey;
+pub use survey::{compare_survey, plan_survey_comparison};
 pub use trajectory_error::{TrajectoryError, trajectory_error};
 pub use unaligned_error::{UnalignedError, unaligned_error};
 pub use wall_error::{WallError, wall_error};

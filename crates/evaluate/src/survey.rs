@@ -1,6 +1,8 @@
 //! Comparison of a survey's initial poses with refined ones.
 
-use super::compare::{CompareInput, ComparedPanoramas, Comparison, compare};
+use super::compare::{
+    CompareInput, ComparedPanoramas, Comparison, ComparisonPlan, compare, plan_comparison,
+};
 use super::error::EvaluateError;
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_core::survey::Survey;
@@ -21,9 +23,41 @@ pub fn compare_survey(
     interpolation: Interpolation,
     progress: &dyn Progress,
 ) -> Result<(Comparison, ComparedPanoramas), EvaluateError> {
+    with_input(survey, refined, px_per_metre, interpolation, |input| {
+        compare(input, progress)
+    })
+}
+
+/// Lays out what [`compare_survey`] draws, and checks it before a frame is decoded.
+///
+/// # Errors
+/// The errors of [`compare_survey`], as far as they are known by then.
+pub fn plan_survey_comparison(
+    survey: &Survey,
+    refined: &[Pose],
+    px_per_metre: Option<f64>,
+) -> Result<ComparisonPlan, EvaluateError> {
+    let interpolation = Interpolation::default();
+    with_input(
+        survey,
+        refined,
+        px_per_metre,
+        interpolation,
+        plan_comparison,
+    )
+}
+
+/// Calls `act` with the comparison of a survey's initial poses with refined ones.
+fn with_input<T>(
+    survey: &Survey,
+    refined: &[Pose],
+    px_per_metre: Option<f64>,
+    interpolation: Interpolation,
+    act: impl FnOnce(&CompareInput) -> T,
+) -> T {
     let initial = survey.initial_poses();
     let truth = survey.truth.as_deref().map(poses_of);
-    let input = CompareInput {
+    act(&CompareInput {
         surface: survey.surface.as_ref(),
         camera: &survey.camera,
         shutter: &survey.shutter(),
@@ -38,6 +72,5 @@ pub fn compare_survey(
             blend: false,
             super_resolve: false,
         },
-    };
-    compare(&input, progress)
+    })
 }

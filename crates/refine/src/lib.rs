@@ -85,7 +85,7 @@ pub use error::RefineError;
 pub use input::{RefineInput, is_motionless};
 pub use model::problem_error::ProblemError;
 pub use options::{Photometry, RefineOptions, ShapeMode};
-pub use pipeline::{refine, refine_with_checkpoint};
+pub use pipeline::{check_input, refine, refine_with_checkpoint};
 pub use point_fit::points_report::{PointsAxis, PointsReport, PointsSection};
 pub use points::error::PointsFitError;
 pub use points::wall_points::WallPoints;

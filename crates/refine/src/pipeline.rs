@@ -35,6 +35,17 @@ pub fn refine<'a>(
     refine_with_checkpoint(input, options, None, progress)
 }
 
+/// Checks input and options as [`refine`] does before it decodes a frame.
+///
+/// # Errors
+/// [`RefineError`].
+pub fn check_input<'a>(
+    input: impl Into<RefineInput<'a>>,
+    options: &RefineOptions,
+) -> Result<(), RefineError> {
+    Setup::new(input.into(), options).map(drop)
+}
+
 /// Refines the poses of frames, with snapshots kept in a checkpoint; resumes from the snapshot that
 /// is in it.
 ///
@@ -61,6 +72,7 @@ pub fn refine_with_checkpoint<'a>(
         if estimation.solution.is_none() {
             session.keep_if_due(&setup, || estimation.state.clone())?;
         }
+        session.enter_stage(&setup, &estimation.state);
         let ended = match run_stage(stage, &setup, estimation, &mut session) {
             Ok(estimation) => Some(estimation),
             Err(RefineError::Problem(ProblemError::Factor { .. })) => None,
@@ -74,9 +86,13 @@ pub fn refine_with_checkpoint<'a>(
             }
             Some(ended) => ended.without_first_stage(),
             // Poses that nothing determines are those given.
-            None => return Ok(without_solution(&setup, &mut session)),
+            None => {
+                session.progress.leave_job();
+                return Ok(without_solution(&setup, &mut session));
+            }
         };
     }
+    session.progress.leave_job();
     estimation.refined.ok_or(RefineError::NoOverlap)
 }
 
@@ -113,6 +129,7 @@ fn begin(setup: &Setup) -> PipelineState {
     };
     PipelineState {
         stages: plan_stages(setup.options, setup.handover_level()),
+        over: Vec::new(),
         noise: 0.0,
         has_common_light: true,
         dispersion: 1.0,

@@ -162,3 +162,11 @@ pub struct RefineReport {
     /// Time by stage.
     pub timings: Vec<StageTime>,
 }
+
+impl RefineReport {
+    /// Number of frames with a flag.
+    pub fn count_flagged(&self, flag: FrameFlag) -> usize {
+        let frames = self.frames.iter();
+        frames.filter(|frame| frame.flag == flag).count()
+    }
+}

@@ -74,5 +74,5 @@ pub use error::SimulateError;
 pub use fittings::fitting_options::Fittings;
 pub use options::{Illumination, SimulateOptions, Wall};
 pub use scene::Scene;
-pub use survey_folder::{SimulationRecord, stage_survey, write_survey};
+pub use survey_folder::{SimulationRecord, check_survey, stage_survey, write_survey};
 pub use texture::slanted_edge::SlantedEdge;

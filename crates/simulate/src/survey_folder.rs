@@ -61,8 +61,7 @@ pub fn stage_survey(
     overwrite: bool,
     progress: &dyn Progress,
 ) -> Result<(SimulationRecord, StagedFolder), SimulateError> {
-    let scene = Scene::new(options)?;
-    check_output_folder(out, overwrite)?;
+    let scene = checked_scene(options, out, overwrite)?;
     let simulated = SimulationRecord {
         program: tunnelstitch_core::PROGRAM,
         options: options.clone(),
@@ -80,6 +79,30 @@ pub fn stage_survey(
     write_masks(&scene, folder.path()).map_err(final_name)?;
     write_frames(&scene, &folder.path().join("frames"), progress).map_err(final_name)?;
     Ok((simulated, folder))
+}
+
+/// Checks what [`write_survey`] checks before the first frame; writes nothing.
+///
+/// # Errors
+/// [`SimulateError`].
+pub fn check_survey(
+    options: &SimulateOptions,
+    out: &Path,
+    overwrite: bool,
+) -> Result<(), SimulateError> {
+    checked_scene(options, out, overwrite).map(drop)
+}
+
+/// The scene of a survey that can be written into the folder `out`.
+fn checked_scene(
+    options: &SimulateOptions,
+    out: &Path,
+    overwrite: bool,
+) -> Result<Scene, SimulateError> {
+    let scene = Scene::new(options)?;
+    check_output_folder(out, overwrite)?;
+    atomic::check_folder(atomic::parent_folder(out))?;
+    Ok(scene)
 }
 
 /// Mask of the pixels that show the wall; only written if the rig's shaft is visible.

@@ -1,7 +1,7 @@
 //! Arguments of a panorama's files.
 
 use crate::cli::output::{
-    Failure, create_parent_folder, picture_format, record, refuse_overwriting, survey_files,
+    Failure, check_parent_folder, picture_format, record, refuse_overwriting, survey_files,
 };
 use crate::files::printed;
 use crate::frames::{JPEG_LIMIT_PX, JPEG_QUALITY};
@@ -60,7 +60,7 @@ enum CompressionArgument {
 }
 
 impl OutputArguments {
-    /// Checks the names before any work is done, and creates missing folders.
+    /// Checks names and folders before any work is done.
     ///
     /// # Errors
     /// An extension of no supported format; a path that is a folder; a folder that cannot be
@@ -74,10 +74,10 @@ impl OutputArguments {
                     printed(dzi)
                 )));
             }
-            create_parent_folder(dzi)?;
+            check_parent_folder(dzi)?;
         }
         if let Some(folder) = &self.maps {
-            atomic::create_folder(folder)?;
+            atomic::check_folder(folder)?;
         }
         Ok(())
     }
@@ -89,9 +89,7 @@ impl OutputArguments {
     pub fn check_overwriting(&self, survey: &Survey) -> Result<(), Failure> {
         let mut inputs = survey_files(survey);
         inputs.extend(self.covariance.clone());
-        let mut outputs = self.options().paths();
-        outputs.insert(1, self.run_file());
-        refuse_overwriting(&outputs, inputs)
+        refuse_overwriting(&self.paths(), inputs)
     }
 
     /// Checks that the formats can hold the frames' bits and the size of the canvas.
@@ -130,6 +128,13 @@ impl OutputArguments {
             )));
         }
         Ok(())
+    }
+
+    /// All files and folders that are written.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        let mut paths = self.options().paths();
+        paths.insert(1, self.run_file());
+        paths
     }
 
     /// Path of the record of the run.

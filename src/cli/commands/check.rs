@@ -2,7 +2,7 @@
 
 use crate::check::{self, Check, MaskCheck, PosesCheck};
 use crate::cli::arguments::PoseReadingArguments;
-use crate::cli::output::{Failure, Terminal, json};
+use crate::cli::output::{Failure, Terminal, duration_text, json};
 use crate::frames::{PictureFormat, write_picture};
 use std::path::{Path, PathBuf};
 
@@ -176,7 +176,7 @@ fn summary(check: &Check) -> String {
             "refine takes about",
             Some(format!(
                 "{}, {} MiB",
-                duration(effort.refine_s),
+                duration_text(effort.refine_s),
                 effort.refine_bytes >> 20
             )),
         ),
@@ -208,13 +208,4 @@ fn poses_text(poses: &PosesCheck) -> String {
             ""
         }
     )
-}
-
-/// A duration in the unit that suits it.
-fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 90.0 => format!("{s:.0} s"),
-        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
-    }
 }

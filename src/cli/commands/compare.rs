@@ -2,8 +2,12 @@
 
 use crate::cli::arguments::{PictureArguments, PoseReadingArguments, positive};
 use crate::cli::commands::overlay::leave_out_overlay;
-use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
-use crate::evaluate::{ComparedPanoramas, Comparison, compare_survey, draw_before_after};
+use crate::cli::output::{
+    DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
+};
+use crate::evaluate::{
+    ComparedPanoramas, Comparison, compare_survey, draw_before_after, plan_survey_comparison,
+};
 use crate::files::printed;
 use crate::frames::{PictureFormat, add_picture};
 use crate::persist::atomic::{self, OutputSet};
@@ -11,7 +15,7 @@ use crate::progress::Progress;
 use crate::render::Layout;
 use crate::report::poses_file;
 use crate::survey::Survey;
-use crate::trajectory::poses_of;
+use crate::trajectory::{Pose, poses_of};
 use image::DynamicImage;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -44,7 +48,20 @@ pub struct CompareArguments {
     max_wall_px: Option<f64>,
     #[command(flatten)]
     reading: PoseReadingArguments,
+    #[command(flatten)]
+    dry_run: DryRunArguments,
 }
+
+/// Extract of the initial above the refined panorama.
+const BEFORE_AFTER: &str = "before-after.png";
+/// Panorama of the initial poses.
+const BASELINE_PICTURE: &str = "baseline.png";
+/// Panorama of the refined poses.
+const REFINED_PICTURE: &str = "refined.png";
+/// Panorama of the true poses.
+const TRUTH_PICTURE: &str = "truth.png";
+/// All errors.
+const COMPARISON_FILE: &str = "compare.json";
 
 /// `compare.json`.
 #[derive(Serialize)]
@@ -78,8 +95,11 @@ pub fn run(
     }
     let refined_file = poses_file(&arguments.refined);
     let refined = poses_of(&survey.read_poses(&refined_file)?);
+    atomic::check_folder(&arguments.out)?;
+    if arguments.dry_run.is_set() {
+        return describe(arguments, &survey, &refined, &refined_file)?.print(terminal);
+    }
     leave_out_overlay(&mut survey, terminal)?;
-    atomic::create_folder(&arguments.out)?;
     let (comparison, drawings) = compare_survey(
         &survey,
         &refined,
@@ -106,6 +126,29 @@ pub fn run(
         terminal.say(format!("wrote {}", printed(&arguments.out)));
     }
     check_quality(&comparison, arguments.max_wall_px)
+}
+
+/// The work, which is checked as far as is possible without frames.
+///
+/// # Errors
+/// Poses that cannot be placed on the wall, too little memory.
+fn describe(
+    arguments: &CompareArguments,
+    survey: &Survey,
+    refined: &[Pose],
+    refined_file: &Path,
+) -> Result<Job, Failure> {
+    let canvas = &arguments.picture.canvas;
+    let plan = plan_survey_comparison(survey, refined, canvas.px_per_metre)?;
+    let truth = survey.truth.as_ref().map(|_| TRUTH_PICTURE);
+    let names = [BEFORE_AFTER, BASELINE_PICTURE, REFINED_PICTURE].into_iter();
+    let names = names.chain(truth).chain([COMPARISON_FILE, RUN_FILE]);
+    Ok(Job {
+        writes: names.map(|name| arguments.out.join(name)).collect(),
+        panorama_px: Some(Layout::from(canvas.layout).size(&plan.canvas)),
+        memory_bytes: Some(plan.memory_bytes),
+        ..Job::of(survey, [refined_file])
+    })
 }
 
 /// Writes the panoramas and compare.json for `out`; returns the text of compare.json and the files,
@@ -138,19 +181,16 @@ pub fn stage_comparison(
     };
     let baseline = drawings.baseline.panorama.into_image(Layout::ThetaRight);
     let refined = drawings.refined.panorama.into_image(Layout::ThetaRight);
-    write(
-        "before-after.png",
-        &draw_before_after(&baseline, &refined).into(),
-    )?;
-    write("baseline.png", &layout.turn(baseline))?;
-    write("refined.png", &layout.turn(refined))?;
+    write(BEFORE_AFTER, &draw_before_after(&baseline, &refined).into())?;
+    write(BASELINE_PICTURE, &layout.turn(baseline))?;
+    write(REFINED_PICTURE, &layout.turn(refined))?;
     match drawings.truth {
-        Some(truth) => write("truth.png", &truth.panorama.into_image(layout))?,
+        Some(truth) => write(TRUTH_PICTURE, &truth.panorama.into_image(layout))?,
         // A picture of an earlier comparison would show other poses.
-        None => outputs.remove(&out.join("truth.png"))?,
+        None => outputs.remove(&out.join(TRUTH_PICTURE))?,
     }
     terminal.finish();
-    outputs.write_text(&out.join("compare.json"), &json)?;
+    outputs.write_text(&out.join(COMPARISON_FILE), &json)?;
     Ok((json, outputs))
 }
 

@@ -1,7 +1,7 @@
 //! `tunnelstitch converge`: measures the basin of convergence on simulated surveys.
 
 use crate::cli::arguments::{JitterArgument, WallArgument, picture_size};
-use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
+use crate::cli::output::{DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::converge::{self, ConvergeOptions, SweepWall, TranslationScale};
 use crate::files::printed;
 use crate::trajectory::JitterModel;
@@ -110,6 +110,8 @@ pub struct ConvergeArguments {
     /// --noise, and for another version of the program.
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    dry_run: DryRunArguments,
 }
 
 fn translation_scale(text: &str) -> Result<TranslationScale, String> {
@@ -158,6 +160,9 @@ pub fn run(
     record: &RunRecord,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
+    if arguments.dry_run.is_set() {
+        return describe(arguments)?.print(terminal);
+    }
     if arguments.efficiency {
         return run_efficiency(arguments, record, terminal);
     }
@@ -182,6 +187,36 @@ pub fn run(
         swept.done
     ));
     Ok(())
+}
+
+/// The work, after the checks that come before the first run.
+///
+/// # Errors
+/// Impossible options, a log of another sweep, a folder that cannot be written into.
+fn describe(arguments: &ConvergeArguments) -> Result<Job, Failure> {
+    let (options, out) = (arguments.options(), &arguments.out);
+    let (names, amount): (&[&str], _) = if arguments.efficiency {
+        let surveys = converge::plan_efficiency(&options, out)?;
+        let amount = format!("{surveys} surveys to simulate and refine");
+        (&["efficiency.json", "efficiency.txt", RUN_FILE], amount)
+    } else {
+        let plan = converge::plan_sweep(&options, out, arguments.force)?;
+        let names = &[
+            "runs.jsonl",
+            "converge.json",
+            "converge.txt",
+            "converge.png",
+            RUN_FILE,
+        ];
+        let (missing, kept) = (plan.missing, plan.kept);
+        let amount = format!("{missing} runs to do, {kept} found in runs.jsonl");
+        (names, amount)
+    };
+    Ok(Job {
+        writes: names.iter().map(|name| out.join(name)).collect(),
+        amount: Some(amount),
+        ..Job::default()
+    })
 }
 
 /// Measures the efficiency instead of the basin of convergence.

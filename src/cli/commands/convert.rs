@@ -3,7 +3,7 @@
 use crate::camera::{ColmapCamera, UnknownModelError};
 use crate::cli::arguments::PosesArguments;
 use crate::cli::output::{
-    Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, is_stream, json, record,
+    Failure, RUN_FILE, RunRecord, Terminal, check_parent_folder, is_stream, json, record,
     refuse_overwriting, refuse_two_results, survey_files,
 };
 use crate::files::printed;
@@ -111,7 +111,7 @@ pub fn run(
     if is_stream(out) {
         return json::print_text(&text);
     }
-    create_parent_folder(out)?;
+    check_parent_folder(out)?;
     let mut outputs = OutputSet::default();
     outputs.write_text(out, &text)?;
     record.add_to(&mut outputs, &record::path_beside(out), &inputs)?;

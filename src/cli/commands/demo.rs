@@ -2,8 +2,8 @@
 
 use super::compare::stage_comparison;
 use super::overlay::leave_out_overlay;
-use super::refine::print_summary;
-use super::refine_files::stage_refined;
+use super::refine_files::{check_outputs, stage_refined};
+use super::refine_summary::print_summary;
 use super::report::stage_report;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::{Comparison, compare_survey};
@@ -87,14 +87,15 @@ pub fn run(
         "\ntunnelstitch refine {survey_path} --out {refined_path}"
     ));
     let mut survey = Survey::open(&folders.survey)?;
+    let out = &folders.refined;
+    check_outputs(&survey, out)?;
     let overlay = leave_out_overlay(&mut survey, terminal)?;
     let options = RefineOptions::default();
-    let out = &folders.refined;
     let (refined, _, outputs) =
         stage_refined(&survey, &overlay, &options, out, record, None, terminal)?;
     outputs.commit()?;
     if !terminal.is_json() {
-        print_summary(&refined, terminal);
+        print_summary(&refined.report, false, terminal);
     }
 
     let poses = folders.refined.join("poses.tum");

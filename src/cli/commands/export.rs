@@ -2,10 +2,13 @@
 
 use crate::cli::arguments::{LayerArguments, LayerName, PosesArguments, TextureArguments};
 use crate::cli::output::{
-    Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, json, record,
+    DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, check_parent_folder, json, record,
 };
 use crate::files::printed;
-use crate::inspect::{ExportFiles, MANIFEST, TILESET, Viewer, stage_page, stage_wall};
+use crate::inspect::{
+    ExportFiles, MANIFEST, PosedLayer, TILESET, Viewer, plan_layers, plan_wall, stage_page,
+    stage_wall,
+};
 use crate::persist::atomic::OutputSet;
 use crate::render::Canvas;
 use crate::survey::Survey;
@@ -53,6 +56,8 @@ pub struct ExportArguments {
     layers: LayerArguments,
     #[command(flatten)]
     textures: TextureArguments,
+    #[command(flatten)]
+    dry_run: DryRunArguments,
 }
 
 /// Description of the output.
@@ -79,11 +84,11 @@ pub fn run(
 ) -> Result<(), Failure> {
     check_outputs(arguments)?;
     let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
+    if arguments.dry_run.is_set() {
+        return describe(arguments, (survey, trajectory))?.print(terminal);
+    }
     let inputs = record::hash_survey(&survey, arguments.poses.file())?;
-    let files = ExportFiles {
-        glb: arguments.glb.as_deref(),
-        tiles: arguments.tiles.as_deref(),
-    };
+    let files = arguments.files();
     let mut outputs = OutputSet::default();
     let canvas = if files.glb.is_some() || files.tiles.is_some() {
         let (poses, options) = (poses_of(&trajectory), arguments.textures.options());
@@ -105,9 +110,7 @@ pub fn run(
         }
         None => Vec::new(),
     };
-    let beside = arguments.glb.iter().map(|glb| record::path_beside(glb));
-    let folders = arguments.tiles.iter().chain(&arguments.web);
-    for path in beside.chain(folders.map(|folder| folder.join(RUN_FILE))) {
+    for path in arguments.run_files() {
         record.add_to(&mut outputs, &path, &inputs)?;
     }
     outputs.commit()?;
@@ -125,6 +128,51 @@ pub fn run(
         print_summary(&report, terminal);
         Ok(())
     }
+}
+
+impl ExportArguments {
+    /// Files that are drawn from one panorama.
+    fn files(&self) -> ExportFiles<'_> {
+        ExportFiles {
+            glb: self.glb.as_deref(),
+            tiles: self.tiles.as_deref(),
+        }
+    }
+
+    /// Paths of the records of the run.
+    fn run_files(&self) -> Vec<PathBuf> {
+        let beside = self.glb.iter().map(|glb| record::path_beside(glb));
+        let folders = self.tiles.iter().chain(&self.web);
+        let inside = folders.map(|folder| folder.join(RUN_FILE));
+        beside.chain(inside).collect()
+    }
+}
+
+/// The work, which is checked as far as is possible without frames.
+///
+/// # Errors
+/// Layers that do not exist, poses that cannot be placed on the wall, too little memory.
+fn describe(arguments: &ExportArguments, opened: (Survey, Trajectory)) -> Result<Job, Failure> {
+    let (options, files) = (arguments.textures.options(), arguments.files());
+    let outputs = [&arguments.glb, &arguments.tiles, &arguments.web];
+    let mut job = Job {
+        writes: outputs.into_iter().flatten().cloned().collect(),
+        ..Job::of(&opened.0, arguments.poses.file())
+    };
+    job.writes.extend(arguments.run_files());
+    if files.glb.is_some() || files.tiles.is_some() {
+        let plan = plan_wall(&opened.0, &poses_of(&opened.1), &options, files)?;
+        job.panorama_px = Some([plan.canvas.columns, plan.canvas.rows]);
+        job.memory_bytes = Some(plan.memory_bytes);
+    }
+    if arguments.web.is_some() {
+        let layers = &arguments.layers;
+        let (survey, selected) = layers.select(&arguments.survey, &arguments.poses, opened)?;
+        let posed: Vec<PosedLayer> = selected.into_iter().map(|(_, posed)| posed).collect();
+        let bytes = plan_layers(&survey, &posed, &options)?;
+        job.memory_bytes = job.memory_bytes.max(Some(bytes));
+    }
+    Ok(job)
 }
 
 fn print_summary(report: &ExportReport, terminal: &Terminal) {
@@ -159,10 +207,11 @@ fn check_outputs(arguments: &ExportArguments) -> Result<(), Failure> {
                 printed(glb)
             )));
         }
-        create_parent_folder(glb)?;
+        check_parent_folder(glb)?;
     }
     for (folder, file) in [(&arguments.tiles, TILESET), (&arguments.web, MANIFEST)] {
         if let Some(folder) = folder {
+            check_parent_folder(folder)?;
             check_replaceable(folder, file)?;
         }
     }

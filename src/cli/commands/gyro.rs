@@ -5,7 +5,7 @@ use crate::cli::arguments::{
 };
 use crate::cli::output::{
     Failure, PosesReport, RunRecord, Suggestion, SuggestionArguments, Terminal,
-    create_parent_folder, record,
+    check_parent_folder, record,
 };
 use crate::files::printed;
 use crate::persist::atomic::OutputSet;
@@ -244,7 +244,7 @@ pub fn run(
              --advance-m, --advance-m-per-s or --table",
         );
     }
-    create_parent_folder(&arguments.out)?;
+    check_parent_folder(&arguments.out)?;
     let mut outputs = OutputSet::default();
     outputs.write_text(&arguments.out, &tum::format(&baseline.trajectory))?;
     let inputs = arguments.times.files(arguments.survey.as_deref());

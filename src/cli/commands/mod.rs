@@ -18,6 +18,8 @@ pub mod project;
 pub mod refine;
 pub mod refine_files;
 pub mod refine_memory;
+pub mod refine_summary;
+
 pub mod report;
 pub mod shell;
 pub mod simulate;

@@ -4,7 +4,7 @@ use crate::cli::arguments::{
     FrameTimesArguments, MotionArguments, MountingArguments, clock_times, numbers, positive,
 };
 use crate::cli::output::{
-    Failure, RunRecord, Suggestion, SuggestionArguments, Terminal, create_parent_folder, record,
+    Failure, RunRecord, Suggestion, SuggestionArguments, Terminal, check_parent_folder, record,
 };
 use crate::files::printed;
 use crate::persist::atomic::OutputSet;
@@ -111,7 +111,7 @@ pub fn run(
             pose: station.carrier().after(&camera),
         })
         .collect();
-    create_parent_folder(&arguments.out)?;
+    check_parent_folder(&arguments.out)?;
     let mut outputs = OutputSet::default();
     outputs.write_text(&arguments.out, &tum::format(&trajectory))?;
     let inputs = arguments.times.files(arguments.survey.as_deref());

@@ -1,20 +1,23 @@
 //! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
 
+use crate::check::{refine_bytes, refine_s};
 use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
 use crate::cli::commands::overlay::leave_out_overlay;
-use crate::cli::commands::refine_files::stage_refined;
+use crate::cli::commands::refine_files::{
+    FOUND_FILES, REFINED_FILES, check_outputs, stage_refined,
+};
 use crate::cli::commands::refine_memory::check_memory;
-use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
-use crate::files::printed;
-use crate::persist::atomic;
+use crate::cli::commands::refine_summary::{print_outputs, print_summary};
+use crate::cli::output::{
+    DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
+};
 use crate::progress::Progress;
 use crate::refine::{
-    CalibrationReport, FrameFlag, FrameReport, Photometry, ReadoutEstimate, RefineOptions,
-    RefineReport, Refined, ShapeMode, search_readings,
+    FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, WallPoints,
+    check_input, search_readings,
 };
-use crate::report::{REFINEMENT_FILE, SECTIONS_FILE};
 use crate::survey::{CalibrationGroup, Survey};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Refines the poses of a survey by photometric bundle adjustment.
@@ -97,10 +100,15 @@ pub struct RefineArguments {
     /// exit code is 4 in any case.)
     #[arg(long, value_name = "SHARE", value_parser = share)]
     min_photometric: Option<f64>,
+    /// Also print the table of global solves and the time of each stage.
+    #[arg(long, short)]
+    verbose: bool,
     #[command(flatten)]
     reading: PoseReadingArguments,
     #[command(flatten)]
     resume: ResumeArguments,
+    #[command(flatten)]
+    dry_run: DryRunArguments,
 }
 
 /// Names of modes for `--shape`.
@@ -185,13 +193,16 @@ pub fn run(
     let options = arguments.options();
     let points = arguments.points.as_deref();
     let mut survey = (arguments.reading).open(&arguments.survey, points, terminal)?;
+    check_outputs(&survey, &arguments.out)?;
+    check_memory(&survey)?;
+    if arguments.dry_run.is_set() {
+        return describe(&survey, &options, &arguments.out)?.print(terminal);
+    }
     let inputs = record::hash_survey(&survey, None)?;
     let origin = resume::origin(&survey, &options, inputs.clone())?;
     let say = |text: &str| terminal.say(text);
-    check_memory(&survey)?;
-    atomic::create_folder(&arguments.out)?;
     let result = arguments.out.join("refine");
-    let (refined, json) = arguments.resume.run(&result, &origin, say, |checkpoint| {
+    let (report, json, files) = arguments.resume.run(&result, &origin, say, |checkpoint| {
         // After the check that the run to be continued is of the same frames.
         let overlay = leave_out_overlay(&mut survey, terminal)?;
         let (refined, json, mut outputs) = stage_refined(
@@ -204,20 +215,48 @@ pub fn run(
             terminal,
         )?;
         record.add_to(&mut outputs, &arguments.out.join(RUN_FILE), &inputs)?;
+        let files = outputs.file_names();
         outputs.commit()?;
-        Ok((refined, json))
+        Ok((refined.report, json, files))
     })?;
     // Frames that fit at two places are read rightly.
-    if 2 * count_flagged(&refined.report, FrameFlag::Prior) > survey.frames.len() {
+    if 2 * report.count_flagged(FrameFlag::Prior) > survey.frames.len() {
         warn_of_reading(&survey, terminal)?;
     }
     if terminal.is_json() {
         json::print_text(&json)?;
     } else {
-        print_summary(&refined, terminal);
-        print_outputs(arguments, &refined.report, terminal);
+        print_summary(&report, arguments.verbose, terminal);
+        if arguments.joint && !report.levels.iter().any(|level| level.joint) {
+            terminal.say(
+                "  refined without --joint: the wall is smooth, so it has no detail below a pixel \
+                 to estimate",
+            );
+        }
+        print_outputs(&report, &arguments.out, &files, terminal);
     }
-    conclude(arguments, &refined.report, terminal)
+    conclude(arguments, &report, terminal)
+}
+
+/// The work of a refinement into `out`, which is checked as far as is possible without frames.
+///
+/// # Errors
+/// Poses, options or measured points that cannot be refined.
+fn describe(survey: &Survey, options: &RefineOptions, out: &Path) -> Result<Job, Failure> {
+    let points = WallPoints::of_survey(survey)?;
+    let input = RefineInput {
+        points: points.as_ref(),
+        ..RefineInput::from(survey)
+    };
+    check_input(input, options)?;
+    let path = |name: &&str| out.join(name);
+    Ok(Job {
+        writes: REFINED_FILES.iter().map(path).collect(),
+        may_write: FOUND_FILES.iter().map(path).collect(),
+        memory_bytes: Some(refine_bytes(survey)),
+        time_s: Some(refine_s(survey, options)),
+        ..Job::of(survey, None)
+    })
 }
 
 /// Says in one sentence whether the result may be used; fails if it may not, or if fewer frames are
@@ -267,11 +306,6 @@ impl RefineArguments {
     }
 }
 
-fn count_flagged(report: &RefineReport, flag: FrameFlag) -> usize {
-    let frames = report.frames.iter();
-    frames.filter(|frame| frame.flag == flag).count()
-}
-
 /// Searches for a reading of poses and pictures that the frames agree with, and warns if there is
 /// one.
 fn warn_of_reading(survey: &Survey, terminal: &Terminal) -> Result<(), Failure> {
@@ -282,243 +316,4 @@ fn warn_of_reading(survey: &Survey, terminal: &Terminal) -> Result<(), Failure> 
         terminal.warn(found.sentence());
     }
     Ok(())
-}
-
-/// Prints the files that were written, and how to continue.
-fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &Terminal) {
-    let is_joint = report.levels.iter().any(|level| level.joint);
-    if arguments.joint && !is_joint {
-        terminal.say(
-            "  refined without --joint: the wall is smooth, so it has no detail below a pixel to \
-             estimate",
-        );
-    }
-    let out = printed(&arguments.out);
-    let poses = arguments.out.join("poses.tum");
-    terminal.say(format!(
-        "wrote {} and {}",
-        printed(&poses),
-        printed(&arguments.out.join(REFINEMENT_FILE))
-    ));
-    if report.photometry == Photometry::Normalised {
-        terminal.say(
-            "frames were compared by their contrast, normalised locally: the light is not that of \
-             a model with gain, bias and one shading for all",
-        );
-    }
-    if let Some(points) = &report.points {
-        terminal.say(points.sentence());
-    }
-    if let Some(bend) = &report.bend {
-        terminal.say(format!(
-            "the tunnel bends towards {:.0}° with a radius of {:.0} ± {:.0} m (1-σ); poses and \
-             chainage are along the bend",
-            bend.towards_deg, bend.radius_m, bend.radius_sigma_m
-        ));
-    }
-    let shape = report
-        .shape
-        .as_ref()
-        .filter(|shape| !shape.scales.is_empty());
-    if let Some(shape) = shape.filter(|_| arguments.out.join(SECTIONS_FILE).is_file()) {
-        terminal.say(format!(
-            "the wall deviates from the given shape by {:.1} mm (root mean square): {} has its \
-             sections, `tunnelstitch report` draws them",
-            shape.rms_mm,
-            printed(&arguments.out.join(SECTIONS_FILE))
-        ));
-    }
-    let none_above_mm = report.shape.as_ref().and_then(|s| s.none_above_mm());
-    if let Some(none_above_mm) = none_above_mm {
-        terminal.say(format!(
-            "no deformation of the wall is seen; {none_above_mm:.2} mm (root mean square) would be"
-        ));
-    }
-    if let Some(masked) = report.masked.as_ref().filter(|masked| masked.area_m2 > 0.0) {
-        terminal.say(format!(
-            "most frames show something else than the wall on {:.2} m² ({:.2} %): left out, listed \
-             in {REFINEMENT_FILE}, drawn by stitch --maps",
-            masked.area_m2,
-            100.0 * masked.share
-        ));
-    }
-    terminal.say(report.scale.sentence());
-    if report.calibration.is_some() {
-        terminal.say(format!(
-            "{out} is a survey with the refined calibration: tunnelstitch stitch {out} --poses {} \
-             --out panorama.png",
-            printed(&poses)
-        ));
-    }
-}
-
-/// Prints the estimated parameters of the self-calibration.
-fn print_calibration(calibration: &CalibrationReport, terminal: &Terminal) {
-    terminal.say("  calibration              given     estimate          1-σ   (prior 1-σ)");
-    for unknown in &calibration.unknowns {
-        let unit = match unknown.unit {
-            "1" => "",
-            unit => unit,
-        };
-        terminal.say(format!(
-            "  {:<13} {:>3} {:>12.5} {:>12.5} {:>12.5}   ({:.5}){}",
-            unknown.name,
-            unit,
-            unknown.initial,
-            unknown.estimate,
-            unknown.sigma,
-            unknown.prior_sigma,
-            if unknown.observed {
-                ""
-            } else {
-                "   not observable"
-            },
-        ));
-    }
-    for unknown in &calibration.unknowns {
-        if let Some(reason) = &unknown.reason {
-            let name = unknown.name;
-            terminal.warn(format!("  {name} keeps its given value: {reason}"));
-        }
-    }
-}
-
-/// Warning about a residual that grows along the rows, with the remedy.
-fn rolling_shutter_warning(rows: &ReadoutEstimate) -> String {
-    let remedy = if rows.given_ms == 0.0 {
-        format!(
-            "if the camera has a rolling shutter, give [camera] readout_ms = {:.1} in survey.toml",
-            rows.estimate_ms
-        )
-    } else {
-        format!(
-            "not {} ms as given; check [camera] readout_ms and the times of the initial poses",
-            rows.given_ms
-        )
-    };
-    format!(
-        "rolling-shutter test: all frames have the same systematic residual along the rows, \
-         {:.1} px from the first row to the last, equal to a readout time of {:.1} ms (1-σ {:.2}): \
-         {remedy}",
-        rows.shift_px, rows.estimate_ms, rows.sigma_ms
-    )
-}
-
-/// Prints solves, uncertainty, timings and rejected frames of a refinement.
-pub fn print_summary(refined: &Refined, terminal: &Terminal) {
-    let report = &refined.report;
-    terminal.say("  level  steps        cost: start → end      observations  noise (grey)");
-    for level in &report.levels {
-        let solve = &level.solve;
-        terminal.say(format!(
-            "  {:>5}  {:>5}  {:>12.4e} → {:>11.4e}  {:>12}  {:>12.2}{}",
-            level.level,
-            solve.iterations,
-            solve.cost_start,
-            solve.cost_end,
-            solve.observations,
-            solve.sigma,
-            if level.joint {
-                "  jointly with the wall"
-            } else {
-                ""
-            }
-        ));
-    }
-    let mean = |value: &dyn Fn(&FrameReport) -> f64| {
-        report.frames.iter().map(value).sum::<f64>() / report.frames.len() as f64
-    };
-    terminal.say(format!(
-        "  stopped: {}\n  mean 1-σ: rotation {:.4}°, translation {:.2} mm, on the wall {:.2} mm \
-         ({:.3} px)",
-        report.stopped_because,
-        mean(&|f| f.sigma.rotation_deg),
-        1e3 * mean(&|f| f.sigma.translation_m),
-        1e3 * mean(&|f| f.sigma.wall_m),
-        mean(&|f| f.sigma.wall_px),
-    ));
-    if let Some(calibration) = &report.calibration {
-        print_calibration(calibration, terminal);
-    }
-    if let Some(rows) = report.rolling_shutter.filter(|rows| rows.systematic) {
-        terminal.warn(rolling_shutter_warning(&rows));
-    }
-    let seconds: f64 = report.timings.iter().map(|t| t.seconds).sum();
-    let stages: Vec<String> = report
-        .timings
-        .iter()
-        .map(|t| format!("{} {:.2} s", t.stage, t.seconds))
-        .collect();
-    terminal.say(format!("  {seconds:.2} s: {}", stages.join(", ")));
-    for finding in &report.prior_test.findings {
-        terminal.warn(format!("  {finding}"));
-    }
-    if let Some(found) = &report.model_error {
-        terminal.say(format!(
-            "  residuals go together over {:.2} m of the wall, more than by noise: σ includes \
-             errors of lens, shape or light as far as they show",
-            found.patch_m
-        ));
-    }
-    if report.frames_on_prior > 0 {
-        terminal.warn(format!(
-            "{} of {} frames are rejected, so their poses rest on the prior:",
-            report.frames_on_prior,
-            report.frames.len()
-        ));
-        let contradicts = report.prior_test.contradicting_scale().is_some();
-        if report.frames_on_prior == report.frames.len() && !contradicts {
-            terminal.warn(explain_failure(report));
-        }
-        warn_of_rejected_frames(report, terminal);
-    }
-}
-
-/// Possible causes where no frame is photometric.
-fn explain_failure(report: &RefineReport) -> &'static str {
-    if 2 * count_flagged(report, FrameFlag::Ambiguous) > report.frames.len() {
-        "  no frame is photometric: the wall repeats itself, and the initial poses are too \
-         uncertain to tell its repetitions apart; more exact ones, with a smaller σ under \
-         [prior], do"
-    } else {
-        "  no frame is photometric; possible causes: too few overlapping frames, a wall without \
-         texture, poses in another convention (--pose-convention, --camera-axes, --tunnel-frame), \
-         a wrong radius_m, calibration or [prior], or a mask or tunnel.ignore that leaves nothing \
-         to compare"
-    }
-}
-
-/// Largest number of warnings about rejected frames.
-const MAX_REJECTION_WARNINGS: usize = 24;
-
-/// Warns of rejected frames with the reason; consecutive frames with the same reason share a line.
-fn warn_of_rejected_frames(report: &RefineReport, terminal: &Terminal) {
-    let frames = report.frames.iter();
-    let rejected: Vec<(&FrameReport, &str)> = frames
-        .filter(|frame| frame.flag != FrameFlag::Photometric)
-        .filter_map(|frame| Some((frame, frame.reason.as_deref()?)))
-        .collect();
-    let mut runs =
-        rejected.chunk_by(|(a, reason), (b, next)| b.index == a.index + 1 && reason == next);
-    for run in runs.by_ref().take(MAX_REJECTION_WARNINGS) {
-        match run {
-            [] => {}
-            [(frame, reason)] => {
-                terminal.warn(format!(
-                    "  frame {} ({}): {reason}",
-                    frame.index, frame.file
-                ));
-            }
-            [(first, reason), .., (last, _)] => terminal.warn(format!(
-                "  frames {} to {} ({} to {}), each: {reason}",
-                first.index, last.index, first.file, last.file
-            )),
-        }
-    }
-    let left: usize = runs.map(<[_]>::len).sum();
-    if left > 0 {
-        terminal.warn(format!(
-            "  … and {left} more; refine.json has the reason of each"
-        ));
-    }
 }

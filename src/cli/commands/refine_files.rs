@@ -1,7 +1,7 @@
 //! Files that `refine` writes.
 
 use crate::camera::format_calibration;
-use crate::cli::output::{Failure, RunRecord, Terminal, json};
+use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::deformation::{
     ShapeEstimate, deviation_sigmas_m, measure_sections, sections_csv,
 };
@@ -26,10 +26,32 @@ use std::path::Path;
 use std::sync::Arc;
 use tunnelstitch_core::PROGRAM;
 
+/// Name of the refined poses.
+const POSES_FILE: &str = "poses.tum";
+/// Name of the covariances.
+const COVARIANCE_FILE: &str = "covariance.csv";
 /// Name of the wall's shape.
 const SHAPE_FILE: &str = "shape.json";
 /// Name of the refined calibration.
 const CAMERA_FILE: &str = "camera.json";
+
+/// Files that every refinement writes.
+pub const REFINED_FILES: [&str; 5] = [
+    POSES_FILE,
+    REFINEMENT_FILE,
+    COVARIANCE_FILE,
+    SURVEY_FILE,
+    RUN_FILE,
+];
+
+/// Files that a refinement writes if it has found something for them, and removes otherwise.
+pub const FOUND_FILES: [&str; 5] = [
+    MASKED_FILE,
+    OVERLAY_FILE,
+    CAMERA_FILE,
+    SHAPE_FILE,
+    SECTIONS_FILE,
+];
 
 /// `refine.json`.
 #[derive(Serialize)]
@@ -68,8 +90,6 @@ pub fn stage_refined(
     checkpoint: Option<&mut Checkpoint>,
     terminal: &Arc<Terminal>,
 ) -> Result<(Refined, String, OutputSet), Failure> {
-    atomic::create_folder(out)?;
-    refuse_survey_folder(&survey.folder, out)?;
     let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
     let points = WallPoints::of_survey(survey)?;
     let input = RefineInput {
@@ -88,7 +108,7 @@ pub fn stage_refined(
         report: &refined.report,
     })?;
     let mut outputs = OutputSet::default();
-    outputs.write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
+    outputs.write_text(&out.join(POSES_FILE), &tum::format(&refined.trajectory))?;
     outputs.write_text(&out.join(REFINEMENT_FILE), &json)?;
     let sigmas: Vec<_> = refined
         .report
@@ -97,7 +117,7 @@ pub fn stage_refined(
         .map(|frame| frame.sigma)
         .collect();
     let covariances = refined.covariances.csv(&sigmas);
-    outputs.write_text(&out.join("covariance.csv"), &covariances)?;
+    outputs.write_text(&out.join(COVARIANCE_FILE), &covariances)?;
     add_masked_wall(&mut outputs, refined.masked.as_ref(), out)?;
     add_overlay(&mut outputs, overlay, out)?;
     add_survey(&mut outputs, survey, &refined, out)?;
@@ -137,9 +157,14 @@ fn add_overlay(outputs: &mut OutputSet, overlay: &Overlay, out: &Path) -> Result
     }
 }
 
-/// Refuses to write what is found over the survey's own files.
-fn refuse_survey_folder(survey: &Path, out: &Path) -> Result<(), Failure> {
-    match (survey.canonicalize(), out.canonicalize()) {
+/// Checks the folder of the results before any work is done.
+///
+/// # Errors
+/// A folder that cannot be created or written into; the survey's own folder, whose files would be
+/// replaced.
+pub fn check_outputs(survey: &Survey, out: &Path) -> Result<(), Failure> {
+    atomic::check_folder(out)?;
+    match (survey.folder.canonicalize(), out.canonicalize()) {
         (Ok(survey), Ok(folder)) if survey == folder => Err(Failure::input(format!(
             "{}: --out must not be the survey's own folder, whose {SURVEY_FILE} would be replaced",
             printed(out)

@@ -5,14 +5,16 @@ use crate::cli::arguments::{
     AsBuiltArguments, DegradationArguments, ImagingArguments, JitterArgument, TunnelArguments,
     WallArgument, numbers, picture_size, positive, view_angle,
 };
-use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
+use crate::cli::output::{
+    DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
+};
 use crate::files::printed;
 use crate::persist::atomic::OutputSet;
 use crate::simulate::{self, Illumination, SimulateOptions, Wall};
 use crate::survey::PriorSection;
 use crate::trajectory::JitterModel;
 use clap::ValueEnum;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Simulates a survey: frames of a tunnel wall, initial poses with errors, and the true poses.
 ///
@@ -147,6 +149,8 @@ pub struct SimulateArguments {
     /// bytes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    dry_run: DryRunArguments,
 }
 
 /// Names of experiments.
@@ -286,14 +290,19 @@ pub fn run(
     }
     let options = arguments.options()?;
     let out = &arguments.out;
-    let (simulated, folder) = simulate::stage_survey(&options, out, arguments.force, terminal)?;
     let inputs = [
         &arguments.camera,
         &arguments.texture,
         &options.tunnel.centreline,
         &options.as_built.shape_file,
     ];
-    let inputs = record::hash_files(inputs.into_iter().flatten().map(AsRef::as_ref))?;
+    let inputs: Vec<&Path> = inputs.into_iter().flatten().map(AsRef::as_ref).collect();
+    if arguments.dry_run.is_set() {
+        simulate::check_survey(&options, out, arguments.force)?;
+        return describe(&options, &inputs, out).print(terminal);
+    }
+    let (simulated, folder) = simulate::stage_survey(&options, out, arguments.force, terminal)?;
+    let inputs = record::hash_files(inputs)?;
     let mut outputs = OutputSet::default();
     outputs.folder(folder)?;
     record.add_to(&mut outputs, &out.join(RUN_FILE), &inputs)?;
@@ -312,9 +321,28 @@ pub fn run(
     };
     terminal.say(format!(
         "{out}: {} frames of {} × {} px, with true poses\nnext: tunnelstitch {next}",
-        options.frames - options.bad_frames.missing_count(),
+        frame_count(&options),
         options.camera.width,
         options.camera.height
     ));
     Ok(())
+}
+
+/// Number of frames that are written.
+fn frame_count(options: &SimulateOptions) -> usize {
+    options.frames - options.bad_frames.missing_count()
+}
+
+/// The work of simulating a survey from `inputs` into the folder `out`.
+fn describe(options: &SimulateOptions, inputs: &[&Path], out: &Path) -> Job {
+    let (width, height) = (options.camera.width, options.camera.height);
+    Job {
+        reads: inputs.iter().map(|path| path.to_path_buf()).collect(),
+        writes: vec![out.to_owned()],
+        amount: Some(format!(
+            "{} frames of {width} × {height} px to simulate",
+            frame_count(options)
+        )),
+        ..Job::default()
+    }
 }

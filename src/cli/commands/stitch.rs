@@ -5,7 +5,7 @@ use crate::cli::arguments::{
     memory_size, resume,
 };
 use crate::cli::commands::overlay::leave_out_overlay;
-use crate::cli::output::{Failure, RunRecord, Terminal, json, record};
+use crate::cli::output::{DryRunArguments, Failure, Job, RunRecord, Terminal, json, record};
 use crate::evaluate::deformation::DeviationMap;
 use crate::files::printed;
 use crate::persist::atomic::OutputSet;
@@ -53,6 +53,8 @@ pub struct StitchArguments {
     ignore_offset: bool,
     #[command(flatten)]
     resume: ResumeArguments,
+    #[command(flatten)]
+    dry_run: DryRunArguments,
 }
 
 /// Description of a panorama.
@@ -131,6 +133,10 @@ pub fn run(
     let (canvas, format) = (*stitch.canvas(), stitch.frames().format());
     let files = output.options();
     let budget = stitch.budget(files.pending_bytes(&canvas, format, run.layout))?;
+    output.check_formats(&canvas, format, run.layout)?;
+    if arguments.dry_run.is_set() {
+        return run.job(&stitch, &budget).print(terminal);
+    }
     run.announce(&stitch, &budget);
     let inputs = record::hash_survey(&survey, arguments.poses.file())?;
     let origin = resume::origin(&survey, &run.options_of_result(), inputs.clone())?;
@@ -138,7 +144,6 @@ pub fn run(
     arguments
         .resume
         .run(&output.out, &origin, say, |checkpoint| {
-            output.check_formats(&canvas, format, run.layout)?;
             for also in [&files.dzi, &files.maps].into_iter().flatten() {
                 checkpoint.lock_also(also)?;
             }
@@ -162,12 +167,27 @@ impl StitchRun<'_> {
     /// Prints the size of the panorama and the memory that it takes.
     fn announce(&self, stitch: &Stitch, budget: &Budget) {
         let [width, height] = self.layout.size(stitch.canvas());
-        let frames_bytes = stitch.frames().frame_bytes() * self.survey.frames.len() as u64;
+        let frames_bytes = self.frames_bytes(stitch);
         self.terminal.say(format!(
             "{width} × {height} px; at most {} MiB of memory, {} of them for frames",
             budget.most(frames_bytes) >> 20,
             frames_bytes.min(budget.room) >> 20
         ));
+    }
+
+    /// Memory of all frames together, bytes.
+    fn frames_bytes(&self, stitch: &Stitch) -> u64 {
+        stitch.frames().frame_bytes() * self.survey.frames.len() as u64
+    }
+
+    /// The work, for `--dry-run`.
+    fn job(&self, stitch: &Stitch, budget: &Budget) -> Job {
+        Job {
+            writes: self.arguments.output.paths(),
+            panorama_px: Some(self.layout.size(stitch.canvas())),
+            memory_bytes: Some(budget.most(self.frames_bytes(stitch))),
+            ..Job::of(self.survey, self.arguments.poses.file())
+        }
     }
 
     /// Everything that the result depends on, except the survey.

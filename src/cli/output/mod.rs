@@ -1,8 +1,11 @@
 //! Output that commands share: texts on the terminal, JSON, failures with their exit codes, and the
 //! record of a run beside its results.
 
+mod dry_run;
+mod duration;
 mod failure;
 mod failure_output;
+mod job_clock;
 pub mod json;
 mod label;
 mod paths;
@@ -11,9 +14,11 @@ mod stream;
 mod suggestion;
 mod terminal;
 
+pub use dry_run::{DryRunArguments, Job};
+pub use duration::duration_text;
 pub use failure::Failure;
 pub use failure_output::{print_failure, print_failures_as_json, refused_arguments};
-pub use paths::{create_parent_folder, picture_format, refuse_overwriting, survey_files};
+pub use paths::{check_parent_folder, picture_format, refuse_overwriting, survey_files};
 pub use record::{RUN_FILE, RunRecord};
 pub use stream::{is_stream, refuse_two_results};
 pub use suggestion::{PosesReport, Suggestion, SuggestionArguments};

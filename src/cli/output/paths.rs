@@ -7,7 +7,7 @@ use crate::persist::atomic;
 use crate::survey::Survey;
 use std::path::{Path, PathBuf};
 
-/// Finds the format of a picture to be written, and creates its folder if it is missing.
+/// Finds the format of a picture to be written, and checks its folder.
 ///
 /// # Errors
 /// An extension of no supported format; a path that is a folder; a folder that cannot be created.
@@ -19,18 +19,18 @@ pub fn picture_format(path: &Path) -> Result<PictureFormat, Failure> {
             printed(path)
         )));
     }
-    create_parent_folder(path)?;
+    check_parent_folder(path)?;
     Ok(format)
 }
 
-/// Creates the folder of a file to be written, if it is missing.
+/// Checks that a file can be written into its folder, which is created with it if it is missing.
 ///
 /// # Errors
 /// Whatever the system says.
-pub fn create_parent_folder(path: &Path) -> Result<(), Failure> {
+pub fn check_parent_folder(path: &Path) -> Result<(), Failure> {
     match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => Ok(atomic::create_folder(folder)?),
-        _ => Ok(()),
+        Some(folder) if !folder.as_os_str().is_empty() => Ok(atomic::check_folder(folder)?),
+        _ => Ok(atomic::check_folder(Path::new("."))?),
     }
 }
 

@@ -1,7 +1,6 @@
 //! Lines that `survey.toml` needs for poses that have just been written.
 
 use super::failure::Failure;
-use super::paths::create_parent_folder;
 use super::terminal::Terminal;
 use crate::persist::atomic;
 use crate::survey::{PosesSection, PriorSection};
@@ -94,7 +93,6 @@ impl Suggestion {
             terminal.say(format!("    {line}").trim_end());
         }
         if let Some(path) = &arguments.toml_out {
-            create_parent_folder(path)?;
             atomic::write_text(path, &text)?;
         }
         Ok(())

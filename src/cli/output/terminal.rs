@@ -1,14 +1,16 @@
 //! Progress bars, summaries and warnings on the terminal.
 
 use super::failure::Failure;
+use super::job_clock::JobClock;
 use super::json;
 use super::label::Label;
 use crate::files::escape_controls;
-use crate::progress::Progress;
-use indicatif::{ProgressBar, ProgressStyle};
+use crate::progress::{JobStage, Progress};
+use indicatif::style::TemplateError;
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use serde::Serialize;
 use std::io::Write;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Prints a line on standard error with its control characters escaped. A standard error that is
@@ -37,6 +39,8 @@ pub struct Terminal {
     quiet: bool,
     is_json: bool,
     bar: Mutex<Option<ProgressBar>>,
+    /// Clock of the job under way, if it has several stages.
+    clock: Mutex<Option<JobClock>>,
 }
 
 impl Terminal {
@@ -47,6 +51,7 @@ impl Terminal {
             quiet,
             is_json,
             bar: Mutex::new(None),
+            clock: Mutex::new(None),
         }
     }
 
@@ -80,6 +85,10 @@ impl Terminal {
         print_labelled(Label::Warning, text.as_ref());
     }
 
+    fn clock(&self) -> MutexGuard<'_, Option<JobClock>> {
+        self.clock.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn with_bar(&self, act: impl FnOnce(&ProgressBar)) {
         if let Ok(guard) = self.bar.lock()
             && let Some(bar) = guard.as_ref()
@@ -96,9 +105,7 @@ impl Progress for Terminal {
             return;
         }
         let bar = ProgressBar::new(total as u64);
-        if let Ok(style) = ProgressStyle::with_template(
-            "{prefix:>12} [{bar:30}] {pos}/{len} {per_sec} {elapsed} (eta {eta}) {msg}",
-        ) {
+        if let Ok(style) = bar_style(*self.clock()) {
             bar.set_style(style.progress_chars("=> "));
         }
         bar.set_prefix(stage.to_owned());
@@ -123,4 +130,28 @@ impl Progress for Terminal {
             bar.finish_and_clear();
         }
     }
+
+    fn enter_job_stage(&self, stage: JobStage) {
+        let mut clock = self.clock();
+        *clock = Some(JobClock::enter(*clock, stage));
+    }
+
+    fn leave_job(&self) {
+        *self.clock() = None;
+    }
+}
+
+/// Style of a bar: with the time that is left of the stage, or of the whole job, if it has a clock.
+fn bar_style(clock: Option<JobClock>) -> Result<ProgressStyle, TemplateError> {
+    let Some(clock) = clock else {
+        return ProgressStyle::with_template(
+            "{prefix:>12} [{bar:30}] {pos}/{len} {per_sec} {elapsed} (eta {eta}) {msg}",
+        );
+    };
+    let job = move |state: &ProgressState, text: &mut dyn std::fmt::Write| {
+        // Nobody could be told of an error.
+        let _ = text.write_str(&clock.text(state.fraction().into()));
+    };
+    let template = "{prefix:>12} [{bar:30}] {pos}/{len} {elapsed} ({job}) {msg}";
+    Ok(ProgressStyle::with_template(template)?.with_key("job", job))
 }

@@ -229,6 +229,16 @@ pub fn measure_efficiency(
     Ok(table)
 }
 
+/// Counts the surveys that [`measure_efficiency`] would refine; writes nothing.
+///
+/// # Errors
+/// [`ConvergeError`], as far as it is known before the first survey.
+pub fn plan_efficiency(options: &ConvergeOptions, out: &Path) -> Result<usize, ConvergeError> {
+    options.validate()?;
+    atomic::check_folder(out)?;
+    Ok(options.cells().len() * options.seeds as usize)
+}
+
 /// Writes efficiency.json and efficiency.txt.
 fn write_files(table: &[Efficiency], out: &Path) -> Result<(), ConvergeError> {
     let path = out.join("efficiency.json");

@@ -35,11 +35,11 @@ mod summary_table;
 mod sweep;
 mod sweep_cell;
 
-pub use efficiency::{Efficiency, ErrorRatio, PoseRms, measure_efficiency};
+pub use efficiency::{Efficiency, ErrorRatio, PoseRms, measure_efficiency, plan_efficiency};
 pub use error::ConvergeError;
 pub use majority_error::{GOOD_PX, MajorityError, majority_error};
 pub use options::{ConvergeOptions, TranslationScale};
 pub use run_record::{RunRecord, SCHEMA_VERSION, Settings};
 pub use summary::{CellSummary, Convergence};
-pub use sweep::{SweepOutcome, run_sweep};
+pub use sweep::{SweepOutcome, SweepPlan, plan_sweep, run_sweep};
 pub use sweep_cell::{SweepCell, SweepWall};

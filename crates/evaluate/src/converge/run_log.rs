@@ -5,12 +5,12 @@ use crate::converge::run_record::{RunRecord, Settings};
 use crate::converge::sweep_cell::SweepCell;
 use std::collections::HashMap;
 use std::fs::{File, TryLockError};
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tunnelstitch_core::persist::atomic::WriteError;
 use tunnelstitch_geometry::files::limits::MAX_TABLE_BYTES;
 use tunnelstitch_geometry::files::open_without_links;
-use tunnelstitch_geometry::files::regular::read_limited;
+use tunnelstitch_geometry::files::regular::{open_regular, read_limited};
 
 /// Start of every line.
 const LINE_START: &[u8] = b"{\"schema_version\":";
@@ -22,7 +22,7 @@ const LINE_START: &[u8] = b"{\"schema_version\":";
 pub(super) struct RunLog {
     path: PathBuf,
     file: File,
-    runs: HashMap<(String, u64), RunRecord>,
+    runs: Runs,
 }
 
 impl RunLog {
@@ -37,40 +37,11 @@ impl RunLog {
     pub fn open(path: &Path, settings: &Settings, discard: bool) -> Result<Self, ConvergeError> {
         let fail = |source| ConvergeError::from(WriteError::new(path, source));
         let mut file = open_without_links(path).map_err(fail)?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                return Err(ConvergeError::Log {
-                    path: path.to_owned(),
-                    what: "another sweep is at work here; wait for it, or choose another folder"
-                        .to_owned(),
-                });
-            }
-            // Some file systems do not support locks.
-            Err(TryLockError::Error(_)) => {}
-        }
+        lock(&file, path)?;
         if discard {
             file.set_len(0).map_err(fail)?;
         }
-        let bytes = read_limited(&file, MAX_TABLE_BYTES).map_err(fail)?;
-        let end = bytes
-            .iter()
-            .rposition(|byte| *byte == b'\n')
-            .map_or(0, |k| k + 1);
-        let (lines, rest) = bytes.split_at(end);
-        let runs = parse_runs(lines, settings).and_then(|runs| {
-            if is_line_start(rest) {
-                Ok(runs)
-            } else {
-                Err("its end is no run".to_owned())
-            }
-        });
-        let runs = runs.map_err(|what| ConvergeError::Log {
-            path: path.to_owned(),
-            what: format!(
-                "{what}; choose another folder, or drop the runs that are there with --force"
-            ),
-        })?;
+        let (runs, end) = read_runs(&file, path, settings)?;
         file.set_len(end as u64).map_err(fail)?;
         file.seek(SeekFrom::End(0)).map_err(fail)?;
         Ok(Self {
@@ -101,14 +72,75 @@ impl RunLog {
     }
 }
 
+/// Number of the `wanted` runs that [`RunLog::open`] would find in the log, which stays as it is.
+///
+/// # Errors
+/// The errors of [`RunLog::open`].
+pub(super) fn count_finished<'a>(
+    path: &Path,
+    settings: &Settings,
+    wanted: impl Iterator<Item = (&'a SweepCell, u64)>,
+) -> Result<usize, ConvergeError> {
+    let file = match open_regular(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(0),
+        Err(error) => return Err(WriteError::new(path, error).into()),
+    };
+    lock(&file, path)?;
+    let (runs, _) = read_runs(&file, path, settings)?;
+    let is_finished = |run: &(&SweepCell, u64)| runs.contains_key(&(run.0.key(), run.1));
+    Ok(wanted.filter(is_finished).count())
+}
+
+/// Locks the log, as long as the file is open.
+fn lock(file: &File, path: &Path) -> Result<(), ConvergeError> {
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(ConvergeError::Log {
+            path: path.to_owned(),
+            what: "another sweep is at work here; wait for it, or choose another folder".to_owned(),
+        }),
+        // Some file systems do not support locks.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
+    }
+}
+
+/// Finished runs by cell and seed.
+type Runs = HashMap<(String, u64), RunRecord>;
+
+/// Reads the runs of a log; returns them with the length of their lines, bytes.
+fn read_runs(
+    file: &File,
+    path: &Path,
+    settings: &Settings,
+) -> Result<(Runs, usize), ConvergeError> {
+    let bytes = read_limited(file, MAX_TABLE_BYTES);
+    let bytes = bytes.map_err(|source| WriteError::new(path, source))?;
+    let end = bytes
+        .iter()
+        .rposition(|byte| *byte == b'\n')
+        .map_or(0, |k| k + 1);
+    let (lines, rest) = bytes.split_at(end);
+    let runs = parse_runs(lines, settings).and_then(|runs| {
+        if is_line_start(rest) {
+            Ok(runs)
+        } else {
+            Err("its end is no run".to_owned())
+        }
+    });
+    let runs = runs.map_err(|what| ConvergeError::Log {
+        path: path.to_owned(),
+        what: format!(
+            "{what}; choose another folder, or drop the runs that are there with --force"
+        ),
+    })?;
+    Ok((runs, end))
+}
+
 /// Parses the runs of complete lines; of two runs of the same cell and seed, the last counts.
 ///
 /// # Errors
 /// A description of the first line that is not a run of this sweep.
-fn parse_runs(
-    lines: &[u8],
-    settings: &Settings,
-) -> Result<HashMap<(String, u64), RunRecord>, String> {
+fn parse_runs(lines: &[u8], settings: &Settings) -> Result<Runs, String> {
     let mut runs = HashMap::new();
     for (index, line) in lines.split(|byte| *byte == b'\n').enumerate() {
         if line.is_empty() {
@@ -157,6 +189,11 @@ mod tests {
             log.append(record(0.7, seed)).unwrap();
         }
         drop(log);
+        let (cell, other) = (record(0.7, 1).cell, record(0.8, 1).cell);
+        let wanted = [(&cell, 1), (&cell, 3), (&other, 1)];
+        let finished = |path: &Path| count_finished(path, &settings(), wanted.into_iter());
+        assert_eq!(finished(&path).unwrap(), 1);
+        assert_eq!(finished(&dir.path().join("none")).unwrap(), 0);
         let whole = std::fs::read(&path).unwrap();
         assert!(whole.starts_with(LINE_START));
         let first_end = whole.iter().position(|byte| *byte == b'\n').unwrap() + 1;

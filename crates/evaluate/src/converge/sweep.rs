@@ -4,7 +4,7 @@ use crate::converge::error::ConvergeError;
 use crate::converge::feasible_survey::draw_survey;
 use crate::converge::majority_error::majority_error;
 use crate::converge::options::ConvergeOptions;
-use crate::converge::run_log::RunLog;
+use crate::converge::run_log::{RunLog, count_finished};
 use crate::converge::run_record::RunRecord;
 use crate::converge::success_map::draw_success_map;
 use crate::converge::summary::{CellSummary, Convergence};
@@ -19,6 +19,9 @@ use tunnelstitch_core::survey::Survey;
 use tunnelstitch_geometry::trajectory::poses_of;
 use tunnelstitch_refine::{FrameFlag, RefineOptions, Refined, refine};
 use tunnelstitch_simulate::SimulateOptions;
+
+/// Name of the log of runs.
+const LOG_FILE: &str = "runs.jsonl";
 
 /// Outcome of a call of [`run_sweep`].
 #[derive(Clone, Debug)]
@@ -50,10 +53,9 @@ pub fn run_sweep(
 ) -> Result<SweepOutcome, ConvergeError> {
     options.validate()?;
     atomic::create_folder(out)?;
-    let mut log = RunLog::open(&out.join("runs.jsonl"), &options.settings(), discard)?;
+    let mut log = RunLog::open(&out.join(LOG_FILE), &options.settings(), discard)?;
     let cells = options.cells();
-    let missing: Vec<(&SweepCell, u64)> = (1..=options.seeds)
-        .flat_map(|seed| cells.iter().map(move |cell| (cell, seed)))
+    let missing: Vec<(&SweepCell, u64)> = all_runs(&cells, options.seeds)
         .filter(|(cell, seed)| log.find(cell, *seed).is_none())
         .collect();
     progress.start("experiments", missing.len());
@@ -91,6 +93,44 @@ pub fn run_sweep(
         done: missing.len(),
         kept: cells.len() * options.seeds as usize - missing.len(),
     })
+}
+
+/// Numbers of runs of a sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SweepPlan {
+    /// Runs that [`run_sweep`] would execute.
+    pub missing: usize,
+    /// Runs that are in the log already.
+    pub kept: usize,
+}
+
+/// Counts the runs that [`run_sweep`] would execute; writes nothing.
+///
+/// # Errors
+/// [`ConvergeError`], as far as it is known before the first run.
+pub fn plan_sweep(
+    options: &ConvergeOptions,
+    out: &Path,
+    discard: bool,
+) -> Result<SweepPlan, ConvergeError> {
+    options.validate()?;
+    atomic::check_folder(out)?;
+    let cells = options.cells();
+    let runs = all_runs(&cells, options.seeds);
+    let kept = if discard {
+        0
+    } else {
+        count_finished(&out.join(LOG_FILE), &options.settings(), runs)?
+    };
+    Ok(SweepPlan {
+        missing: cells.len() * options.seeds as usize - kept,
+        kept,
+    })
+}
+
+/// All runs of a sweep, seed by seed.
+fn all_runs(cells: &[SweepCell], seeds: u64) -> impl Iterator<Item = (&SweepCell, u64)> {
+    (1..=seeds).flat_map(move |seed| cells.iter().map(move |cell| (cell, seed)))
 }
 
 /// Draws, simulates, refines and evaluates one survey, with its files in a scratch folder in `out`.

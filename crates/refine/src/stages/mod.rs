@@ -10,6 +10,7 @@
 //! | what changes, and what a checkpoint keeps of it | [`state`] |
 //! | checkpoints, progress, times | [`session`] |
 //! | final poses | [`placement`] |
+//! | shares of the work, for the display of progress | [`work`] |
 //! | dispatch | [`run`](mod@run) |
 
 pub mod assess;
@@ -26,3 +27,4 @@ pub mod shape;
 pub mod solve;
 pub mod state;
 pub mod track;
+pub mod work;

@@ -4,6 +4,7 @@ use crate::model::problem_error::ProblemError;
 use crate::report::StageTime;
 use crate::stages::setup::Setup;
 use crate::stages::state::{PipelineState, Snapshot};
+use crate::stages::work::place_in_job;
 use std::sync::Arc;
 use std::time::Instant;
 use tunnelstitch_core::persist::checkpoint::{Checkpoint, CheckpointError};
@@ -76,6 +77,14 @@ impl<'a> Session<'a> {
             kept.map_err(CheckpointError::from)?;
         }
         Ok(())
+    }
+
+    /// Reports the place of the state's first stage in the whole refinement.
+    pub fn enter_stage(&self, setup: &Setup, state: &PipelineState) {
+        let camera = &setup.input.camera;
+        let pixels = f64::from(camera.width) * f64::from(camera.height);
+        let place = place_in_job(&state.over, &state.stages, pixels);
+        self.progress.enter_job_stage(place);
     }
 
     /// Records the time since the last record under the name of a stage.

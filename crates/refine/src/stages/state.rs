@@ -22,6 +22,8 @@ use tunnelstitch_core::frames::Light;
 pub struct PipelineState {
     /// Stages that are left; the first is the next, or the one under way.
     pub stages: VecDeque<Stage>,
+    /// Stages that are over.
+    pub over: Vec<Stage>,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise: f64,
     /// False if the light has turned out to be no shading that all frames have in common.
@@ -114,7 +116,8 @@ impl Estimation<'_> {
 
     /// The refinement with its first stage over.
     pub fn without_first_stage(mut self) -> Self {
-        self.state.stages.pop_front();
+        let first = self.state.stages.pop_front();
+        self.state.over.extend(first);
         self
     }
 }

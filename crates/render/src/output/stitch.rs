@@ -253,7 +253,7 @@ pub fn render(
 }
 
 /// Checks that `copies` panoramas (each drawn one, and one on its way to the file) and the frames,
-/// all of them held, fit into the free memory.
+/// all of them held, fit into the free memory; returns what they take, bytes.
 ///
 /// # Errors
 /// [`RenderError::Memory`].
@@ -261,8 +261,9 @@ pub fn check_memory(
     canvas: &Canvas,
     copies: u64,
     frames: &PictureCache,
-) -> Result<(), RenderError> {
+) -> Result<u64, RenderError> {
     let picture = canvas.pixels() as u64 * frames.format().pixel_bytes(true) as u64;
     let needed = frames.frame_bytes() * frames.len() as u64 + picture * copies;
-    memory::check_available(canvas, frames, needed, memory::available_bytes())
+    memory::check_available(canvas, frames, needed, memory::available_bytes())?;
+    Ok(needed)
 }

@@ -21,7 +21,7 @@ mod write;
 pub use durable::sync_files;
 pub use error::WriteError;
 pub use error_keeper::ErrorKeeper;
-pub use file::{create_folder, remove_file};
+pub use file::{check_folder, create_folder, remove_file};
 pub use output_set::OutputSet;
 pub use parent::parent_folder;
 pub use staged::{ScratchFolder, StagedFolder};

@@ -100,6 +100,17 @@ impl OutputSet {
         Ok(())
     }
 
+    /// Names of the files and folders that are written, in the order in which they were added,
+    /// without their paths.
+    pub fn file_names(&self) -> Vec<String> {
+        let written = self.replacements.iter();
+        written
+            .filter(|replacement| !matches!(replacement.new, New::Nothing(_)))
+            .filter_map(|replacement| replacement.target.file_name())
+            .map(|name| name.to_string_lossy().into_owned())
+            .collect()
+    }
+
     fn add(&mut self, target: &Path, new: New) {
         let target = target.to_owned();
         self.replacements.push(Replacement { target, new });
@@ -213,7 +224,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         for text in ["first", "second"] {
             std::fs::write(dir.path().join("map"), "old").unwrap();
-            set(dir.path(), text, dir.path()).commit().unwrap();
+            let set = set(dir.path(), text, dir.path());
+            assert_eq!(set.file_names(), ["a.txt", "tiles", "z.txt"]);
+            set.commit().unwrap();
             let (names, content, tiles) = state(dir.path());
             assert_eq!(names, ["a.txt", "tiles", "z.txt"]);
             assert_eq!((content.as_str(), tiles), (text, vec![text.to_owned()]));

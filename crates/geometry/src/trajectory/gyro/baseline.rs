@@ -6,6 +6,7 @@ use super::gcsv::GyroLog;
 use super::gravity::{angle_from_gravity_rad, axis_in_camera};
 use super::integration::IntegratedRotation;
 use super::noise::RotationNoise;
+use super::rate_unit::wrong_unit;
 use super::rates::AngularRates;
 use super::stationary::StationaryInterval;
 use crate::numerics::median::upper_median;
@@ -156,7 +157,12 @@ pub fn baseline_from_gyro(
         let turned = Turned::new(&rates, &axis);
         Some(turned.at(last_s)? - turned.at(first_s)?)
     };
-    if let (Some(total_rad), Some(measured_rad)) = (options.total_turn_rad, turned_rad(&bias))
+    let measured_rad = turned_rad(&bias);
+    let wrong_unit = measured_rad.and_then(|measured_rad| {
+        let planned_rad = options.total_turn_rad.unwrap_or(planned_turn_rad(frames));
+        wrong_unit(measured_rad, planned_rad, log.rate_scale)
+    });
+    if let (Some(total_rad), Some(measured_rad)) = (options.total_turn_rad, measured_rad)
         && last_s > first_s
     {
         bias += axis * ((measured_rad - total_rad) / (last_s - first_s));
@@ -213,7 +219,10 @@ pub fn baseline_from_gyro(
     Ok(GyroBaseline {
         step_sigma_rad: step_sigma_rad(&noise, &trajectory),
         turned_rad: turned_rad(&bias).unwrap_or(f64::NAN),
-        warnings: gaps(&rates, [first_s, last_s]).into_iter().collect(),
+        warnings: gaps(&rates, [first_s, last_s])
+            .into_iter()
+            .chain(wrong_unit)
+            .collect(),
         trajectory,
         rest,
         bias_rad_s: bias,
@@ -221,6 +230,14 @@ pub fn baseline_from_gyro(
         clock,
         noise,
     })
+}
+
+/// Turn of the plan from the first frame to the last, radians.
+fn planned_turn_rad(frames: &FrameStations) -> f64 {
+    match frames.stations {
+        [first, .., last] => last.angle_rad - first.angle_rad,
+        _ => 0.0,
+    }
 }
 
 /// The frames' times on the log's clock; an error if the log does not cover all of them.
@@ -304,6 +321,7 @@ mod tests {
             path: "log.gcsv".into(),
             orientation: None,
             readout: None,
+            rate_scale: 1.0,
             samples: times.filter(|t| !in_gap(*t)).map(sample).collect(),
         }
     }
@@ -362,6 +380,21 @@ mod tests {
         assert!((found.bias_rad_s - Vector3::y() * 0.01).norm() < 1e-9);
         assert_eq!(found.noise.bias_sigma_rad_s, 0.0);
         assert!((found.step_sigma_rad - 1e-4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rates_in_another_unit_than_the_plan_are_warned_of() {
+        let of = |total_deg: f64| {
+            let options = GyroOptions {
+                total_turn_rad: Some(total_deg.to_radians()),
+                ..OPTIONS
+            };
+            baseline(&log(false, true), &options).unwrap().warnings
+        };
+        assert!(of(2f64.to_degrees()).is_empty());
+        // The log turns by 2 rad, and 115 rad are known.
+        let warnings = of(2f64.to_degrees().to_degrees());
+        assert!(warnings[0].contains("gscale,5.729578e1"), "{warnings:?}");
     }
 
     #[test]

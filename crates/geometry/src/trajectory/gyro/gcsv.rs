@@ -59,6 +59,8 @@ pub struct GyroLog {
     pub orientation: Option<Orientation>,
     /// Readout of the camera's rolling shutter, if given.
     pub readout: Option<Readout>,
+    /// Factor from the file's values to rad/s, its `gscale`.
+    pub rate_scale: f64,
     /// The samples.
     pub samples: Vec<GyroSample>,
 }
@@ -194,6 +196,7 @@ impl GyroLog {
             path: path.to_owned(),
             orientation,
             readout,
+            rate_scale: scales.rad_s,
             samples,
         })
     }

@@ -14,6 +14,7 @@ mod gravity;
 mod integration;
 mod noise;
 mod orientation;
+mod rate_unit;
 mod rates;
 mod stationary;
 

@@ -80,7 +80,8 @@ impl StationaryInterval {
         if *mean > MAX_BIAS_RAD_S {
             return Err(format!(
                 "the sensor never rested for {length_s} s: where its rate is steadiest, it is \
-                 {:.2}°/s, more than any bias",
+                 {:.2}°/s, more than any bias (if its values are degrees per second, its header \
+                 needs a gscale of π/180)",
                 mean.to_degrees()
             ));
         }
