@@ -15,7 +15,7 @@
 //! | [`track`](stages::track) | registers one frame after another on the wall that its predecessors show; sliding windows | [`tracking`] |
 //! | [`correct_shading`](stages::correct_shading) | light that moves with the camera, from the overlaps | [`tunnelstitch_photometry`] |
 //! | [`solve`](stages::solve) | all frames together, coarse to fine | [`problem`], [`solver`] |
-//! | [`reject_blurred`](stages::reject_blurred) | rejects blurred frames, registers rejected ones again | [`validation::sharpness`] |
+//! | [`validate_pairs`](stages::validate_pairs) | rejects frames that contradict the others | [`validation::pairwise_ncc`] |
 //! | [`repair`](stages::repair) | rejects inconsistent frames, registers them again, resolves aliases | [`validation`] |
 //! | [`solve`](stages::solve), last | full size, dense samples; then jointly with the wall, if asked for | [`joint`] |
 //! | [`assess`](stages::assess) | uncertainty and verdict of every frame and of the survey | [`uncertainty`], [`verdict`] |

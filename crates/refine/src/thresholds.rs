@@ -300,14 +300,45 @@ pub mod stopping {
     pub const INTERMEDIATE_STEP_SIGMA: f64 = 2.0;
 }
 
-/// Thresholds of `validation/sharpness.rs` and `validation/blurred_frames.rs`.
-pub mod blurred_frames {
-    /// Half width of the window over which fine detail is taken, pixels of the level.
+/// Thresholds of `validation/pairwise_ncc.rs`, `validation/contradictions.rs` and
+/// `validation/blurred_frames.rs`.
+pub mod pairwise_ncc {
+    /// Half width of the window of local contrast in the coarse comparison, pixels of the level.
     ///
-    /// Higher: larger structures count as detail.
+    /// Higher: larger structures are compared.
+    ///
+    /// Chosen by: a window that holds a brick or two.
+    pub const COARSE_WINDOW_PX: usize = 6;
+
+    /// Half width of the window of local contrast in the fine comparison, pixels of the level.
+    ///
+    /// Higher: larger structures are compared.
     ///
     /// Chosen by: unknown.
-    pub const WINDOW_PX: usize = 3;
+    pub const FINE_WINDOW_PX: usize = 3;
+
+    /// Correlation, corrected for noise, below which two frames contradict each other.
+    ///
+    /// Higher: more pairs contradict, and more frames are rejected.
+    ///
+    /// Chosen by: the tests `frames_at_true_poses_correlate` (above 0.8) and
+    /// `frame_displaced_by_a_brick_contradicts_the_others`.
+    pub const MIN_CORRELATION: f64 = 0.6;
+
+    /// Share of the samples that must be left without what stands out of the wall, for the rest to
+    /// vouch for the pair.
+    ///
+    /// Higher: fewer pairs vouch for their frames.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SHARE_WITHOUT_OUTLIERS: f64 = 0.5;
+
+    /// Share of a frame's samples in contradicting pairs up to which it is kept.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_CONTRADICTING_SHARE: f64 = 0.15;
 
     /// Ratio of a frame's variance of fine detail to that of its median partner below which it is
     /// blurred.
@@ -445,12 +476,12 @@ pub mod rolling_shutter_test {
     pub const MIN_DIFFERENCE_SIGMA: f64 = 6.0;
 }
 
-/// Thresholds of `stages/assess.rs, reject_blurred.rs` and `validation/repair.rs`.
+/// Thresholds of `stages/assess.rs, validate_pairs.rs`.
 pub mod assessment {
     /// Share of a frame's pixels that must overlap other frames for its pose to count as
     /// photometric, 0 to 1. Higher: fewer frames are photometric. Chosen by: unknown.
     pub const MIN_PIXEL_SHARE: f64 = 0.03;
-    /// Times that rejected frames are registered again, at the most. Higher: more attempts, in more
-    /// time. Chosen by: unknown.
-    pub const MAX_REGISTRATIONS: usize = 3;
+    /// Pairwise comparisons of all frames, with rejected frames registered again between two, at
+    /// the most. Higher: more attempts, in more time. Chosen by: unknown.
+    pub const MAX_PAIR_ITERATIONS: usize = 3;
 }

@@ -94,6 +94,26 @@ pub fn clip_outliers(image: &GreyImage) -> GreyImage {
 /// Largest detail after [`clip_outliers`], multiples of the robust σ.
 const MAX_CLIPPED_SIGMAS: f32 = 3.0;
 
+/// Removes outliers: pixels that stand out of their surroundings, such as wet patches and glints,
+/// get no value.
+pub fn mask_outliers(image: &GreyImage) -> GreyImage {
+    // Relative to clipped surroundings, so that outliers do not bias the mean.
+    let (means, sigma) = detail(&clip_outliers(image), wide_window(image));
+    let pixels = image.data().iter().zip(&means);
+    let values = pixels.map(|(value, mean)| {
+        if (value - mean).abs() > MAX_KEPT_SIGMAS * sigma {
+            f32::NAN
+        } else {
+            *value
+        }
+    });
+    GreyImage::new(image.width(), image.height(), values.collect())
+}
+
+/// Largest detail of an inlier, multiples of the robust σ; less than the bound of
+/// [`clip_outliers`].
+const MAX_KEPT_SIGMAS: f32 = 2.5;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -118,6 +138,19 @@ mod tests {
             (ab, aa, bb) = (ab + a * b, aa + a * a, bb + b * b);
         }
         assert!(ab / (aa * bb).sqrt() > 0.98);
+    }
+
+    #[test]
+    fn a_wet_patch_is_not_usual_and_the_wall_around_it_is() {
+        let wet = |x: usize, y: usize| (60..66).contains(&x) && (20..27).contains(&y);
+        let value = |k: usize| match (k % 200, k / 200) {
+            (x, y) if wet(x, y) => 60.0,
+            (x, y) => 100.0 + 2.0 * texture(x, y),
+        };
+        let left = mask_outliers(&GreyImage::new(200, 160, (0..32000).map(value).collect()));
+        for (k, value) in left.data().iter().enumerate() {
+            assert_eq!(value.is_nan(), wet(k % 200, k / 200), "{k}");
+        }
     }
 
     #[test]

@@ -33,7 +33,7 @@ pub use frame_file::{FrameFile, list_frames};
 pub use frame_set::FrameSet;
 pub use grey::GreyImage;
 pub use hash::hash_frames;
-pub use local_contrast::{LocalContrast, local_contrast};
+pub use local_contrast::{LocalContrast, local_contrast, mask_outliers};
 pub use local_normalisation::normalise_locally;
 pub use mask::{Mask, PyramidMask};
 pub use noise::{noise_at_level, noise_sigma};

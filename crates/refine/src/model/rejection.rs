@@ -23,6 +23,13 @@ pub enum RejectionReason {
         /// Distance on the wall between the image centres at the two poses, metres.
         separation_m: f64,
     },
+    /// The image contradicts frames that agree among themselves.
+    Contradicts {
+        /// One of them.
+        frame: usize,
+        /// Correlation of local contrast with it.
+        correlation: f64,
+    },
     /// The image is blurred.
     Blurred {
         /// Its contrast at the finest detail over that of its neighbours, 0 to 1.
@@ -84,7 +91,10 @@ impl RejectionReason {
     pub fn is_misfit(&self) -> bool {
         matches!(
             self,
-            Self::NoMatch { .. } | Self::Ambiguous { .. } | Self::Disagrees { .. }
+            Self::NoMatch { .. }
+                | Self::Ambiguous { .. }
+                | Self::Contradicts { .. }
+                | Self::Disagrees { .. }
         )
     }
 
@@ -94,6 +104,7 @@ impl RejectionReason {
             self,
             Self::NoMatch { .. }
                 | Self::Ambiguous { .. }
+                | Self::Contradicts { .. }
                 | Self::Disagrees { .. }
                 | Self::Misaligned { .. }
                 | Self::Disconnected { .. }
@@ -115,6 +126,11 @@ impl fmt::Display for RejectionReason {
                 f,
                 "it matches the wall equally well at two places {separation_m:.2} m apart, \
                  and the prior does not tell which"
+            ),
+            Self::Contradicts { frame, correlation } => write!(
+                f,
+                "it contradicts frames that agree among themselves \
+                 (correlation {correlation:.2} with frame {frame})"
             ),
             Self::Blurred { share } => write!(
                 f,

@@ -21,8 +21,9 @@ pub enum Stage {
     CorrectShading,
     /// Solves all frames together at one pyramid level ([`crate::stages::solve`]).
     Solve(SolvePlan),
-    /// Rejects blurred frames ([`crate::stages::reject_blurred`]).
-    RejectBlurred,
+    /// Rejects frames that contradict the others pair by pair
+    /// ([`crate::stages::validate_pairs`]).
+    ValidatePairs,
     /// Rejects inconsistent frames, registers them again, resolves aliases
     /// ([`crate::stages::repair`]).
     Repair,
@@ -38,7 +39,7 @@ pub fn plan_stages(options: &RefineOptions, handover: usize) -> VecDeque<Stage> 
         let plan = SolvePlan::intermediate(options, level, handover);
         stages.push_back(Stage::Solve(plan));
         if level == handover {
-            stages.push_back(Stage::RejectBlurred);
+            stages.push_back(Stage::ValidatePairs);
         }
     }
     stages.push_back(Stage::Repair);
@@ -155,7 +156,7 @@ mod tests {
         assert_eq!(solves.collect::<Vec<_>>(), expected);
         assert_eq!(stages.back(), Some(&Stage::Assess));
         // The first solve is checked at once, with all of the information.
-        assert_eq!(stages[4], Stage::RejectBlurred);
+        assert_eq!(stages[4], Stage::ValidatePairs);
         let Stage::Solve(first) = stages[3] else {
             panic!("{:?}", stages[3]);
         };

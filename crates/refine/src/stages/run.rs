@@ -5,7 +5,7 @@ use crate::stages::plan::Stage;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
-use crate::stages::{assess, correct_shading, prescreen, reject_blurred, repair, solve, track};
+use crate::stages::{assess, correct_shading, prescreen, repair, solve, track, validate_pairs};
 
 /// Runs a stage: it takes the estimation as the stage before has left it and returns it changed.
 ///
@@ -22,7 +22,7 @@ pub fn run_stage<'a>(
         Stage::Track => track::run(setup, estimation, session),
         Stage::CorrectShading => correct_shading::run(setup, estimation, session),
         Stage::Solve(plan) => solve::run(plan, setup, estimation, session),
-        Stage::RejectBlurred => reject_blurred::run(setup, estimation, session),
+        Stage::ValidatePairs => validate_pairs::run(setup, estimation, session),
         Stage::Repair => repair::run(setup, estimation, session),
         Stage::Assess => assess::run(setup, estimation, session),
     }

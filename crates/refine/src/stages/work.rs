@@ -22,7 +22,7 @@ const LAST_SOLVE_PER_PIXEL_S: f64 = 0.6e-6;
 /// Time per pixel of the solve jointly with the wall.
 const JOINT_SOLVE_PER_PIXEL_S: f64 = 15e-6;
 /// Time of comparing pairs.
-const REJECT_BLURRED_S: f64 = 0.012;
+const VALIDATE_PAIRS_S: f64 = 0.012;
 /// Time of registering rejected frames again.
 const REPAIR_S: f64 = 0.015;
 /// Time of uncertainty and verdict.
@@ -38,7 +38,7 @@ fn work_s(stage: &Stage, pixels: f64) -> f64 {
         Stage::Solve(plan) if plan.sampling.joint => JOINT_SOLVE_PER_PIXEL_S * pixels,
         Stage::Solve(plan) if plan.sampling.variance_weighting => LAST_SOLVE_PER_PIXEL_S * pixels,
         Stage::Solve(_) => INTERMEDIATE_SOLVE_S,
-        Stage::RejectBlurred => REJECT_BLURRED_S,
+        Stage::ValidatePairs => VALIDATE_PAIRS_S,
         Stage::Repair => REPAIR_S,
         Stage::Assess => ASSESS_S,
     }

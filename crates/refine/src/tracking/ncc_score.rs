@@ -49,12 +49,7 @@ impl NccScore {
     /// Source: C. Spearman, "The proof and measurement of association between two things", 1904
     /// (correction for attenuation).
     pub fn corrected_correlation(&self) -> Option<f64> {
-        let corrected = || (self.correlation() / self.texture_share()).min(1.0);
-        self.shows_texture().then(corrected)
-    }
-
-    /// True if noise does not drown the texture.
-    pub fn shows_texture(&self) -> bool {
-        self.texture_share() > MIN_TEXTURE_SHARE
+        let texture = self.texture_share();
+        (texture > MIN_TEXTURE_SHARE).then(|| (self.correlation() / texture).min(1.0))
     }
 }

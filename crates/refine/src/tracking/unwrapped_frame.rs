@@ -6,7 +6,7 @@ use crate::samples::point_sampler::{ImagePoint, PointSampler};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use tunnelstitch_core::frames::{
-    GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level,
+    GreyImage, LocalContrast, Pyramid, local_contrast, mask_outliers, noise_at_level,
 };
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::trajectory::Pose;
@@ -43,6 +43,9 @@ impl UnwrappedFrame {
     /// Frame `frame`, read while its camera moves by `sweep`; its local contrast is taken over no
     /// more than `window_px` pixels to each side, so that only fine detail is left.
     ///
+    /// `with_outliers`: of all that the frame shows, or without what stands out of the wall
+    /// ([`mask_outliers`]).
+    ///
     /// # Errors
     /// [`ProblemError::Frame`].
     pub fn with_window(
@@ -51,10 +54,15 @@ impl UnwrappedFrame {
         frame: usize,
         sweep: &Sweep,
         window_px: usize,
+        with_outliers: bool,
     ) -> Result<Self, ProblemError> {
         let pyramid = context.frames.get(frame)?;
         let image = pyramid.level(level);
-        let local = local_contrast(image, window_px);
+        let local = if with_outliers {
+            local_contrast(image, window_px)
+        } else {
+            local_contrast(&mask_outliers(image), window_px)
+        };
         Ok(Self {
             camera: context.camera.at_level(level).with_sweep(sweep),
             local: Arc::new(local),

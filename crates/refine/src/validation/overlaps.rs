@@ -55,12 +55,16 @@ impl Overlaps {
         })
     }
 
-    /// The frames in batches, each with its later partners.
-    pub fn batches(&self) -> impl Iterator<Item = Batch> {
+    /// The frames in batches, each with those of its later partners for which `is_wanted` is true.
+    pub fn batches(&self, is_wanted: impl Fn(usize, usize) -> bool) -> impl Iterator<Item = Batch> {
         self.frame_range.clone().step_by(BATCH).map(move |start| {
             let frames = start..(start + BATCH).min(self.frame_range.end);
             let partners: Vec<(usize, Vec<usize>)> = frames
-                .map(|a| (a, self.later_partners(a)))
+                .map(|a| {
+                    let mut partners = self.later_partners(a);
+                    partners.retain(|b| is_wanted(a, *b));
+                    (a, partners)
+                })
                 .filter(|(_, partners)| !partners.is_empty())
                 .collect();
             let all = partners

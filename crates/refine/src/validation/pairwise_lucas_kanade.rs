@@ -53,7 +53,7 @@ pub fn align_pairs(
     let camera = context.camera.at_level(level);
     let overlaps = Overlaps::of(context, &camera, states, frame_range)?;
     let mut alignments = Vec::new();
-    for Batch { partners, needed } in overlaps.batches() {
+    for Batch { partners, needed } in overlaps.batches(|_, _| true) {
         let pyramids: BTreeMap<usize, Arc<Pyramid>> = needed
             .par_map(|&k| Ok((k, context.frames.get(k)?)))
             .into_iter()

@@ -11,13 +11,15 @@ use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::solver::neighbourhood::{Neighbourhood, changes};
-use crate::thresholds::assessment::MAX_REGISTRATIONS;
+use crate::thresholds::assessment::MAX_PAIR_ITERATIONS;
 use crate::thresholds::repair::MAX_ITERATIONS;
 use crate::tracking::track::register_rejected;
 use crate::validation::aliasing::{AliasHypothesis, resolve_aliases, resolve_all_aliases};
 use crate::validation::alignment::Alignment;
+use crate::validation::contradictions::find_contradictions;
 use crate::validation::inconsistent_frames::{find_inconsistent_frames, reject_disagreeing_frames};
 use crate::validation::pairwise_lucas_kanade::align_pairs;
+use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 use std::ops::Range;
 use tunnelstitch_core::progress::Progress;
 
@@ -58,7 +60,7 @@ pub fn repair(
         if !states.has_majority() {
             break;
         }
-        let registered = if iteration < MAX_REGISTRATIONS {
+        let registered = if iteration < MAX_PAIR_ITERATIONS {
             register_rejected(context, options, states)?
         } else {
             0
@@ -88,7 +90,8 @@ pub fn repair(
 }
 
 /// Solves neighbourhoods from the coarsest level to full size, and rejects their frames that
-/// disagree with the others. `solved` is set to the frames as these solves leave them.
+/// disagree with the others or contradict them. `solved` is set to the frames as these solves leave
+/// them.
 fn solve_neighbourhoods(
     context: &EstimationContext,
     options: &RefineOptions,
@@ -97,7 +100,8 @@ fn solve_neighbourhoods(
     solved: &mut FrameStates,
 ) -> Result<(), ProblemError> {
     let side = context.camera.shorter_side();
-    let coarsest = options.coarsest_level(side);
+    let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
+    let count = states.estimates.len();
     let mut shares = Vec::new();
     for neighbourhood in neighbourhoods {
         shares.push(neighbourhood.solve(context, options, 0..=coarsest, states)?);
@@ -106,6 +110,13 @@ fn solve_neighbourhoods(
     for (neighbourhood, shares) in neighbourhoods.iter().zip(&shares) {
         let rejections = &mut states.rejections[neighbourhood.active.clone()];
         reject_disagreeing_frames(shares, rejections);
+    }
+    for neighbourhood in neighbourhoods {
+        let pairs = compute_pairwise_ncc(context, finest, states, &neighbourhood.participants)?;
+        let mut found = find_contradictions(&pairs, count);
+        // Frames that were held lack some of their pairs.
+        found.retain(|(frame, _)| neighbourhood.active.contains(frame));
+        states.reject(found);
     }
     Ok(())
 }

@@ -1,14 +1,16 @@
-//! Stage: rejects blurred frames, registers frames that tracking has rejected again, and solves.
+//! Stage: compares all frames pair by pair, rejects those that contradict the others or are
+//! blurred, registers rejected ones again, and solves.
 
 use crate::error::RefineError;
 use crate::solver::neighbourhood::Neighbourhood;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
-use crate::thresholds::assessment::MAX_REGISTRATIONS;
+use crate::thresholds::assessment::MAX_PAIR_ITERATIONS;
 use crate::tracking::track::register_rejected;
 use crate::validation::blurred_frames::find_blurred_frames;
-use crate::validation::sharpness::compare_sharpness;
+use crate::validation::contradictions::find_contradictions;
+use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 
 /// Runs the stage at the finest level of tracking.
 ///
@@ -24,11 +26,12 @@ pub fn run<'a>(
     let (count, options) = (setup.count(), setup.options);
     let (coarsest, finest) = (setup.coarsest_level(), setup.handover_level());
     let frames = &mut state.frames;
-    session.progress.start("sharpness", MAX_REGISTRATIONS);
-    for iteration in 0..MAX_REGISTRATIONS {
-        let ratios = compare_sharpness(&context, finest, frames)?;
-        frames.reject(find_blurred_frames(&ratios, count));
-        if iteration + 1 == MAX_REGISTRATIONS
+    session.progress.start("check", MAX_PAIR_ITERATIONS);
+    for iteration in 0..MAX_PAIR_ITERATIONS {
+        let pairs = compute_pairwise_ncc(&context, finest, frames, &(0..count))?;
+        frames.reject(find_contradictions(&pairs, count));
+        frames.reject(find_blurred_frames(&pairs, count));
+        if iteration + 1 == MAX_PAIR_ITERATIONS
             || !frames.has_majority()
             || register_rejected(&context, options, frames)? == 0
         {
@@ -38,6 +41,6 @@ pub fn run<'a>(
         session.progress.advance(1);
     }
     session.progress.finish();
-    session.record_time("sharpness");
+    session.record_time("check");
     Ok(estimation)
 }
