@@ -65,9 +65,11 @@ impl FrameStates {
     }
 }
 
-/// Whether most of the frames that show something are inliers; if not, the reason for which none of
-/// them is right: they may fit each other by chance. Nor is a single one, which agrees with no
-/// other.
+/// Finds out whether most of the frames that show something are inliers.
+///
+/// # Errors
+/// The reason for which none of them is right otherwise: they may fit each other by chance, and a
+/// single one agrees with no other.
 pub fn majority(rejections: &[Option<RejectionReason>]) -> Result<(), RejectionReason> {
     let shows_something = |rejection: &&Option<RejectionReason>| {
         !(rejection.as_ref()).is_some_and(RejectionReason::shows_nothing)
