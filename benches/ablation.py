@@ -74,18 +74,19 @@ SURVEYS = [
     ("noise 4", "--wall concrete --noise 4 --seed 12"),
 ]
 # Of 24 frames of 240 × 180 px, with poses that are far off or frames that are wrong.
+SMALL = "--frames 24 --size 240x180"
 BAD = "--bad-frames 5:black,9:blurred,12:occluded,15:repeated"
 HARD = [
-    ("brick, 12°", "--wall brick --jitter independent --rotation-sigma-deg 12 --translation-sigma-m 0.12,0.12,0.18 --seed 27"),
-    ("concrete, 8°", "--wall concrete --rotation-sigma-deg 8 --translation-sigma-m 0.08,0.08,0.12 --seed 24"),
-    ("concrete, 9°", "--wall concrete --jitter independent --rotation-sigma-deg 9 --seed 25"),
-    ("concrete, 11°", "--wall concrete --jitter independent --rotation-sigma-deg 11 --translation-sigma-m 0.1,0.1,0.15 --seed 31"),
-    ("tiled brick, independent, 5°", "--wall tiled-brick --jitter independent --rotation-sigma-deg 5 --seed 32"),
-    ("tiled brick, steps, 6°", "--wall tiled-brick --rotation-sigma-deg 6 --seed 21"),
-    ("tiled brick, 7°", "--wall tiled-brick --rotation-sigma-deg 7 --seed 33"),
-    ("bad frames, brick, 6°", f"--wall brick --rotation-sigma-deg 6 {BAD} --seed 28"),
-    ("bad frames, tiled brick, 4°", f"--wall tiled-brick --rotation-sigma-deg 4 {BAD} --seed 29"),
-    ("bad frames, concrete, 5°", f"--wall concrete --rotation-sigma-deg 5 {BAD} --seed 30"),
+    ("brick, 12°", f"{SMALL} --wall brick --jitter independent --rotation-sigma-deg 12 --translation-sigma-m 0.12,0.12,0.18 --seed 27"),
+    ("concrete, 8°", f"{SMALL} --wall concrete --rotation-sigma-deg 8 --translation-sigma-m 0.08,0.08,0.12 --seed 24"),
+    ("concrete, 9°", f"{SMALL} --wall concrete --jitter independent --rotation-sigma-deg 9 --seed 25"),
+    ("concrete, 11°", f"{SMALL} --wall concrete --jitter independent --rotation-sigma-deg 11 --translation-sigma-m 0.1,0.1,0.15 --seed 31"),
+    ("tiled brick, independent, 5°", f"{SMALL} --wall tiled-brick --jitter independent --rotation-sigma-deg 5 --seed 32"),
+    ("tiled brick, steps, 6°", f"{SMALL} --wall tiled-brick --rotation-sigma-deg 6 --seed 21"),
+    ("tiled brick, 7°", f"{SMALL} --wall tiled-brick --rotation-sigma-deg 7 --seed 33"),
+    ("bad frames, brick, 6°", f"{SMALL} --wall brick --rotation-sigma-deg 6 {BAD} --seed 28"),
+    ("bad frames, tiled brick, 4°", f"{SMALL} --wall tiled-brick --rotation-sigma-deg 4 {BAD} --seed 29"),
+    ("bad frames, concrete, 5°", f"{SMALL} --wall concrete --rotation-sigma-deg 5 {BAD} --seed 30"),
 ]
 LONG = ("long concrete", "--wall concrete --frames 160 --size 160x120 --seed 13")
 
@@ -178,8 +179,7 @@ def main():
     check_out()
     program = ROOT / "target" / "quick" / "tunnelstitch"
     run(["cargo", "build", "--quiet", "--profile", "quick"], cwd=ROOT)
-    drawn = [(name, arguments + " --frames 24 --size 240x180") for name, arguments in HARD]
-    drawn = drawn if options.hard else SURVEYS + [LONG]
+    drawn = HARD if options.hard else SURVEYS + [LONG]
     named = [simulate(name, arguments, options.frames, program) for name, arguments in drawn]
     surveys = named + [survey.resolve() for survey in options.surveys]
     whole = measure(build("whole program", None), surveys)

@@ -1,7 +1,7 @@
 //! Exposure, noise and texture of a dozen frames.
 
 use super::statistics::median_or_zero;
-use crate::frames::{FrameFile, GreyImage, StoredFrame, noise_sigma, used_bits};
+use crate::frames::{FrameFile, GreyImage, StoredFrame, has_sixteen_bits, noise_sigma, used_bits};
 use crate::survey::Survey;
 use serde::Serialize;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -64,7 +64,8 @@ impl PictureCheck {
                     if let Some(mask) = survey.frames.mask() {
                         mask.blank(&mut grey);
                     }
-                    Ok((grey, used_bits(file, &frame)))
+                    let used_bits = used_bits(&frame).filter(|_| has_sixteen_bits(file));
+                    Ok((grey, used_bits))
                 }
                 Err(error) => Err(error.to_string()),
             });

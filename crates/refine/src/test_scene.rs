@@ -8,14 +8,14 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use crate::samples::visibility::PosedFrame;
 use crate::tiles::grid::WallGrid;
 use std::sync::LazyLock;
-use tunnelstitch_core::frames::FrameCache;
-use tunnelstitch_core::test_wall::TestWall;
+use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
+use tunnelstitch_core::test_wall::{TestWall, waves};
 use tunnelstitch_geometry::camera::{Camera, Sweep};
-use tunnelstitch_geometry::surface::{Circle, Footprint, WallPoint, WallRegions};
+use tunnelstitch_geometry::surface::{Circle, Footprint, GaugeMotion, WallPoint, WallRegions};
 use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose, Shutter, spiral};
 
 /// Bricks around.
-pub const BRICKS: f64 = 60.0;
+const BRICKS: f64 = 60.0;
 
 /// Bricks, each of its own grey value, 10 × 6 cm, between light joints of 1 cm.
 pub fn bricks(wall: WallPoint, perimeter_m: f64) -> f64 {
@@ -26,6 +26,46 @@ pub fn bricks(wall: WallPoint, perimeter_m: f64) -> f64 {
     }
     let brick = 12.9898 * x.floor().rem_euclid(BRICKS) + 78.233 * y.floor();
     90.0 + 80.0 * (43758.5453 * brick.sin()).rem_euclid(1.0)
+}
+
+/// Poses of which one is turned about the axis by a brick.
+pub fn displaced_by_a_brick(poses: &[Pose], displaced: usize) -> Vec<Pose> {
+    let mut poses = poses.to_vec();
+    let brick = GaugeMotion::about_y(std::f64::consts::TAU / BRICKS, 0.0);
+    poses[displaced] = brick.apply(&poses[displaced]);
+    poses
+}
+
+/// A faint wall, and pictures of it with patches that are bright in every other one and dark in the
+/// rest.
+pub fn faint_wall_with_glints() -> (TestWall, Vec<GreyImage>) {
+    let faint =
+        |wall: WallPoint, perimeter_m: f64| 128.0 + 0.1 * (waves(wall, perimeter_m) - 128.0);
+    let wall = TestWall::ring(faint);
+    let mut pictures = wall.frames();
+    for (k, picture) in pictures.iter_mut().enumerate() {
+        let (w, glint) = (picture.width(), if k % 2 == 0 { 240.0 } else { 20.0 });
+        for (n, value) in picture.data_mut().iter_mut().enumerate() {
+            if (n % w + 7 * k) % 40 < 6 && (n / w) % 30 < 6 {
+                *value = glint;
+            }
+        }
+    }
+    (wall, pictures)
+}
+
+/// Calls a function with the context of pictures of the wall, and frames at these poses.
+pub fn with_context<T>(
+    wall: &TestWall,
+    pictures: Vec<GreyImage>,
+    poses: &[Pose],
+    function: impl FnOnce(&EstimationContext, &FrameStates) -> T,
+) -> T {
+    let pyramids = pictures.into_iter().map(|frame| Pyramid::new(frame, 1));
+    let frames = FrameCache::of_pyramids(pyramids.collect());
+    let prior = independent_prior(poses);
+    let context = test_context(wall, &frames, &prior);
+    function(&context, &frame_states(poses))
 }
 
 /// Prior of independent poses with 1-σ of 0.05 rad and 5 cm, one frame per second.

@@ -9,10 +9,10 @@ use std::ops::RangeInclusive;
 /// to 14 bits often leave them so.
 pub const UNUSED_UPPER_BITS: RangeInclusive<u32> = 9..=14;
 
-/// Bits of a frame's brightest value, if its file is of 16 bits.
-pub fn used_bits(file: &FrameFile, frame: &StoredFrame) -> Option<u32> {
-    let brightest = frame.brightest().filter(|_| has_sixteen_bits(file))?;
-    Some(u16::BITS - brightest.leading_zeros())
+/// Bits of the brightest value of a frame, of whose file [`has_sixteen_bits`] is true; None of one
+/// of 8 bits.
+pub fn used_bits(frame: &StoredFrame) -> Option<u32> {
+    Some(u16::BITS - frame.brightest()?.leading_zeros())
 }
 
 /// True if the file of a frame has values of 16 bits, by its header.

@@ -77,7 +77,7 @@ impl PictureGroup {
                 return None;
             }
             let frame = StoredFrame::decode(&file, size.0, size.1).ok()?;
-            used_bits(&file, &frame)
+            used_bits(&frame)
         });
         used.max().filter(|bits| UNUSED_UPPER_BITS.contains(bits))
     }

@@ -85,31 +85,24 @@ pub fn align_pairs(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::rejection::RejectionReason;
     use crate::options::RefineOptions;
-    use crate::test_scene::{BRICKS, bricks, frame_states, independent_prior, test_context};
+    use crate::test_scene::{bricks, displaced_by_a_brick, faint_wall_with_glints, with_context};
     use crate::validation::inconsistent_frames::find_inconsistent_frames;
-    use tunnelstitch_core::frames::{FrameCache, GreyImage};
+    use tunnelstitch_core::frames::GreyImage;
     use tunnelstitch_core::test_wall::{TestWall, waves};
-    use tunnelstitch_geometry::surface::{GaugeMotion, WallPoint};
     use tunnelstitch_geometry::trajectory::Pose;
 
     /// Alignments of these pictures at the given poses.
     fn align(wall: &TestWall, pictures: Vec<GreyImage>, poses: &[Pose]) -> Vec<Alignment> {
-        let pyramids = pictures.into_iter().map(|frame| Pyramid::new(frame, 1));
-        let frames = FrameCache::of_pyramids(pyramids.collect());
-        let prior = independent_prior(poses);
-        let context = test_context(wall, &frames, &prior);
-        let states = frame_states(poses);
-        align_pairs(&context, 0, &states, &(0..poses.len())).unwrap()
+        let all = 0..poses.len();
+        with_context(wall, pictures, poses, |context, states| {
+            align_pairs(context, 0, states, &all).unwrap()
+        })
     }
 
     fn inconsistent(alignments: &[Alignment], frames: usize) -> Vec<usize> {
         let found = find_inconsistent_frames(alignments, frames, &RefineOptions::default());
-        found
-            .into_iter()
-            .map(|(frame, _): (usize, RejectionReason)| frame)
-            .collect()
+        found.into_iter().map(|(frame, _)| frame).collect()
     }
 
     #[test]
@@ -141,9 +134,7 @@ mod tests {
     #[test]
     fn frame_displaced_by_a_brick_is_found() {
         let wall = TestWall::ring(bricks);
-        let mut poses = wall.poses.clone();
-        let brick = GaugeMotion::about_y(std::f64::consts::TAU / BRICKS, 0.0);
-        poses[5] = brick.apply(&poses[5]);
+        let poses = displaced_by_a_brick(&wall.poses, 5);
         let found = align(&wall, wall.frames(), &poses);
         assert_eq!(inconsistent(&found, poses.len()), [5], "{found:#?}");
     }
@@ -151,18 +142,7 @@ mod tests {
     /// Dark in some frames and bright in others, with the wall between as it is.
     #[test]
     fn glints_and_water_do_not_displace() {
-        let faint =
-            |wall: WallPoint, perimeter_m: f64| 128.0 + 0.1 * (waves(wall, perimeter_m) - 128.0);
-        let wall = TestWall::ring(faint);
-        let mut pictures = wall.frames();
-        for (k, picture) in pictures.iter_mut().enumerate() {
-            let (w, glint) = (picture.width(), if k % 2 == 0 { 240.0 } else { 20.0 });
-            for (n, value) in picture.data_mut().iter_mut().enumerate() {
-                if (n % w + 7 * k) % 40 < 6 && (n / w) % 30 < 6 {
-                    *value = glint;
-                }
-            }
-        }
+        let (wall, pictures) = faint_wall_with_glints();
         let found = align(&wall, pictures, &wall.poses);
         assert_eq!(
             inconsistent(&found, wall.poses.len()),

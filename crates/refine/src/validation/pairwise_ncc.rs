@@ -281,20 +281,17 @@ fn robust_corrected_correlation(ncc_score: &NccScore, shared: &[(f32, f32)]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::{BRICKS, bricks, frame_states, independent_prior, test_context};
-    use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
-    use tunnelstitch_core::test_wall::{TestWall, waves};
-    use tunnelstitch_geometry::surface::{GaugeMotion, WallPoint};
+    use crate::test_scene::{bricks, displaced_by_a_brick, faint_wall_with_glints, with_context};
+    use tunnelstitch_core::frames::GreyImage;
+    use tunnelstitch_core::test_wall::TestWall;
     use tunnelstitch_geometry::trajectory::Pose;
 
     /// Compares these frames at these poses.
     fn compare_frames(wall: &TestWall, pictures: Vec<GreyImage>, poses: &[Pose]) -> Vec<PairNcc> {
-        let pyramids = pictures.into_iter().map(|frame| Pyramid::new(frame, 1));
-        let frames = FrameCache::of_pyramids(pyramids.collect());
-        let prior = independent_prior(poses);
-        let context = test_context(wall, &frames, &prior);
-        let states = frame_states(poses);
-        compute_pairwise_ncc(&context, 0, &states, &(0..poses.len())).unwrap()
+        let all = 0..poses.len();
+        with_context(wall, pictures, poses, |context, states| {
+            compute_pairwise_ncc(context, 0, states, &all).unwrap()
+        })
     }
 
     #[test]
@@ -311,9 +308,7 @@ mod tests {
     #[test]
     fn frame_displaced_by_a_brick_contradicts_the_others() {
         let wall = TestWall::ring(bricks);
-        let mut poses = wall.poses.clone();
-        let brick = GaugeMotion::about_y(std::f64::consts::TAU / BRICKS, 0.0);
-        poses[5] = brick.apply(&poses[5]);
+        let poses = displaced_by_a_brick(&wall.poses, 5);
         let pairs = compare_frames(&wall, wall.frames(), &poses);
         assert!(pairs.iter().filter(|p| p.a == 5 || p.b == 5).count() >= 2);
         for pair in pairs {
@@ -324,18 +319,7 @@ mod tests {
     /// Dark in some frames and bright in others, with the wall between as it is.
     #[test]
     fn glints_and_water_do_not_contradict() {
-        let faint =
-            |wall: WallPoint, perimeter_m: f64| 128.0 + 0.1 * (waves(wall, perimeter_m) - 128.0);
-        let wall = TestWall::ring(faint);
-        let mut pictures = wall.frames();
-        for (k, picture) in pictures.iter_mut().enumerate() {
-            let (w, glint) = (picture.width(), if k % 2 == 0 { 240.0 } else { 20.0 });
-            for (n, value) in picture.data_mut().iter_mut().enumerate() {
-                if (n % w + 7 * k) % 40 < 6 && (n / w) % 30 < 6 {
-                    *value = glint;
-                }
-            }
-        }
+        let (wall, pictures) = faint_wall_with_glints();
         let pairs = compare_frames(&wall, pictures, &wall.poses);
         // Of a strip hardly wider than a glint nothing is left to compare.
         let long_strips = || pairs.iter().filter(|pair| pair.samples > 80.0);

@@ -6,8 +6,7 @@ use super::temporal_statistics::TemporalStatistics;
 use image::GrayImage;
 use imageproc::distance_transform::Norm;
 use imageproc::morphology::{dilate, open};
-use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
-use tunnelstitch_geometry::numerics::median::median;
+use tunnelstitch_geometry::numerics::median::{MAD_TO_SIGMA, median};
 
 /// Largest spread of a constant pixel, multiple of the picture's median.
 const MAX_SPREAD: f32 = 0.3;

@@ -4,8 +4,7 @@ use super::motion_field::MotionField;
 use super::temporal_statistics::TemporalStatistics;
 use crate::frames::grey::GreyImage;
 use rayon::prelude::*;
-use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
-use tunnelstitch_geometry::numerics::median::median;
+use tunnelstitch_geometry::numerics::median::{MAD_TO_SIGMA, median};
 
 /// Smoothing (passes of `[1 2 1]/4` along both axes) and distance, pixels, of the differences:
 /// strokes of letters, rims and dirt, larger dirt.
