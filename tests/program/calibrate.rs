@@ -58,7 +58,7 @@ fn assert_honest(unknown: &serde_json::Value, truth: f64) {
 /// the refined poses.
 #[test]
 fn a_wrong_focal_length_is_found_and_the_result_is_a_survey() {
-    let dir = first_frames(48);
+    let dir = first_frames(24);
     let out = dir.path().join("out");
     scale_focal(dir.path(), 1.02);
     let focal = calibrate(dir.path(), &out, "focal")("focal");
@@ -81,7 +81,7 @@ fn everything_wrong_at_once_is_found_or_refused() {
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     simulate(
         &survey,
-        &["--frames", "30", "--size", "240x180", "--k1", "-0.05"],
+        &["--frames", "20", "--size", "240x180", "--k1", "-0.05"],
     );
     let truth = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
     change_camera(&survey, |camera| {

@@ -537,7 +537,7 @@ fn what_only_pictures_can_tell_is_named_by_refine() {
 /// and has nothing to say with that line.
 #[test]
 fn what_only_pictures_can_tell_is_named_by_check() {
-    let survey = first_frames(14);
+    let survey = first_frames(10);
     let dir = survey.path();
     let (toml, path) = (dir.join("survey.toml"), dir.join("baseline.tum"));
     let planned = tum::read(&path).unwrap();

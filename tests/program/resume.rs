@@ -97,7 +97,7 @@ fn refine_ends_with_the_same_bytes_however_often_it_is_killed() {
 #[test]
 fn joint_refine_ends_with_the_same_bytes_however_often_it_is_killed() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = survey(dir.path(), 5, "160x120");
+    let survey = survey(dir.path(), 4, "120x90");
     refine_with_kills(&survey, dir.path(), &["--joint"]);
     let report = std::fs::read_to_string(dir.path().join("broken/refine.json")).unwrap();
     assert!(report.contains("\"joint\": true"), "{report}");

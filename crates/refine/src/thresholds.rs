@@ -296,7 +296,9 @@ pub mod stopping {
     /// steps. Chosen by: unknown.
     pub const INTERMEDIATE_STEP_PX: f64 = 0.01;
     /// Step at which a solve that another one follows ends, multiples of the uncertainty. Higher:
-    /// fewer steps. Chosen by: unknown.
+    /// fewer steps. Chosen by: a step of this length leaves one that is far below σ. Tracking with
+    /// it takes 0.9 of the time (18 surveys, the same verdicts), and a fifth to a third where the
+    /// camera is estimated, too: few frames hardly tell the lens.
     pub const INTERMEDIATE_STEP_SIGMA: f64 = 2.0;
 }
 

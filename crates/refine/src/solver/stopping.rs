@@ -23,7 +23,7 @@ impl Stopping {
     pub const TRACKING: Self = Self {
         max_iterations: MAX_SOLVE_ITERATIONS,
         step_px: STEP_TOLERANCE_PX,
-        step_sigma: 0.0,
+        step_sigma: INTERMEDIATE_STEP_SIGMA,
     };
 
     /// The rule of a solve at a pyramid level that only brings the estimate close for the next one.
