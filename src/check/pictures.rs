@@ -34,11 +34,20 @@ pub struct PictureCheck {
     /// full-size pixel.
     pub slope_grey_per_px: f64,
     /// 1-σ of a frame's registration against a known wall by all of its `n` pixels:
-    /// `σ/(gradient √n)`, pixels. The refinement reaches a few times that.
-    pub sigma_px: f64,
+    /// `σ/(gradient √n)`, pixels. The refinement reaches a few times that. None if there is no
+    /// texture.
+    pub sigma_px: Option<f64>,
 }
 
 impl PictureCheck {
+    /// The accuracy of a frame's registration in words, with so many decimals.
+    pub fn describe_registration(&self, decimals: usize) -> String {
+        let bound =
+            |sigma_px: f64| format!("frames can be registered to {sigma_px:.decimals$} px at best");
+        self.sigma_px
+            .map_or("frames cannot be registered".to_owned(), bound)
+    }
+
     /// Decodes a dozen frames and examines start and end of all; also returns the faults.
     pub(super) fn of(survey: &Survey) -> (Self, Vec<String>) {
         let (width, height) = (survey.camera.width, survey.camera.height);
@@ -91,7 +100,8 @@ impl PictureCheck {
             clipped: of(|p| p.clipped),
             noise_grey: of(|p| p.noise_grey),
             slope_grey_per_px: of(|p| p.slope_grey_per_px),
-            sigma_px: of(|p| p.sigma_px),
+            sigma_px: Some(of(|p| p.sigma_px.unwrap_or(f64::INFINITY)))
+                .filter(|sigma_px| sigma_px.is_finite()),
         };
         (check, faults)
     }
@@ -131,7 +141,7 @@ fn measure(picture: &GreyImage, hidden: f64) -> PictureCheck {
         clipped: 1.0 - known / pixels,
         noise_grey,
         slope_grey_per_px: slope,
-        sigma_px: noise_grey.max(0.3) / (slope * pixels.sqrt()).max(1e-9),
+        sigma_px: (slope > 0.0).then(|| noise_grey.max(0.3) / (slope * pixels.sqrt())),
     }
 }
 
@@ -156,7 +166,18 @@ mod tests {
         // Slopes of 2 cos along one of two axes: an RMS of 1 over both.
         let waves = noisy(2.0);
         assert!((waves.slope_grey_per_px - 1.0).abs() < 0.1, "{waves:?}");
-        assert!(waves.sigma_px < flat.sigma_px);
+        let px = |check: &PictureCheck| check.sigma_px.unwrap_or(f64::INFINITY);
+        assert!(px(&waves) < px(&flat));
+    }
+
+    #[test]
+    fn blank_pictures_cannot_be_registered() {
+        let blank = measure(&GreyImage::new(64, 64, vec![90.0; 64 * 64]), 0.0);
+        assert_eq!(blank.sigma_px, None);
+        assert_eq!(
+            blank.describe_registration(1),
+            "frames cannot be registered"
+        );
     }
 
     #[test]

@@ -118,12 +118,16 @@ fn saturated_frames(check: &Check) -> Option<String> {
 
 fn weak_texture(check: &Check) -> Option<String> {
     let pictures = &check.pictures;
-    (pictures.decoded > 0 && pictures.sigma_px > MAX_REGISTRATION_SIGMA_PX).then(|| {
+    let is_enough = pictures
+        .sigma_px
+        .is_some_and(|sigma_px| sigma_px <= MAX_REGISTRATION_SIGMA_PX);
+    (pictures.decoded > 0 && !is_enough).then(|| {
         format!(
             "the wall has hardly any texture (gradient {:.2} grey levels per px, noise {:.1}): \
-             frames can be registered to {:.1} px at best; use grazing light, or a camera nearer \
-             to the wall",
-            pictures.slope_grey_per_px, pictures.noise_grey, pictures.sigma_px
+             {}; use grazing light, or a camera nearer to the wall",
+            pictures.slope_grey_per_px,
+            pictures.noise_grey,
+            pictures.describe_registration(1)
         )
     })
 }

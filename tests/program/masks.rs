@@ -304,3 +304,60 @@ fn wall_that_moves_is_ignored_if_it_is_said_to() {
     assert_eq!(unsure, 0);
     assert!(error_px < 1.5 * sigma_px, "{error_px} {sigma_px}");
 }
+
+/// A tunnel with water on 70° of its invert, that mirrors another wall: the frames of a wider tunnel
+/// of the same poses show through it.
+#[test]
+fn water_that_mirrors_is_left_out_as_a_band() {
+    const WATER_DEG: std::ops::Range<f64> = 145.0..215.0;
+    let dir = tempfile::tempdir().unwrap();
+    let draw = |name: &str, radius_m: &str| {
+        let options = ["--frames", "36", "--size", "240x180", "--noise", "1"];
+        let more = ["--supersample", "2", "--seed", "4", "--radius-m", radius_m];
+        simulate(&dir.path().join(name), &[&options[..], &more].concat());
+        dir.path().join(name)
+    };
+    let (dry, below) = (draw("dry", "3"), draw("below", "4.5"));
+    let survey = Survey::open(&dry).unwrap();
+    let truth = poses_of(survey.truth.as_deref().unwrap());
+    let other = Survey::open(&below).unwrap();
+    assert_eq!(truth, poses_of(other.truth.as_deref().unwrap()));
+    let mut names: Vec<_> = std::fs::read_dir(dry.join("frames"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .collect();
+    names.sort();
+    for (name, pose) in names.iter().zip(&truth) {
+        let path = dry.join("frames").join(name);
+        let mut frame = image::open(&path).unwrap().to_luma8();
+        let mirrored = image::open(below.join("frames").join(name)).unwrap();
+        let mirrored = mirrored.to_luma8();
+        for (x, y, pixel) in frame.enumerate_pixels_mut() {
+            let ray = pose.r_wc * survey.camera.ray(f64::from(x), f64::from(y)).unwrap();
+            let hit = survey.surface.hit(&pose.t_wc, &ray).unwrap();
+            let theta_deg = survey.surface.angle_rad(hit.wall.s_m).to_degrees();
+            if WATER_DEG.contains(&theta_deg.rem_euclid(360.0)) {
+                *pixel = *mirrored.get_pixel(x, y);
+            }
+        }
+        frame.save(&path).unwrap();
+    }
+    let (report, _) = refined(&dry);
+    let bands = report["hidden_bands"].as_array().unwrap();
+    let [band] = &bands[..] else {
+        panic!("{bands:?}")
+    };
+    let angle = |name: &str| band[name].as_f64().unwrap();
+    let (from, to) = (angle("angle_from_deg"), angle("angle_to_deg"));
+    assert!((from - WATER_DEG.start).abs() <= 5.0, "{band}");
+    assert!((to - WATER_DEG.end).abs() <= 5.0, "{band}");
+    let poses = poses_of(&survey.read_poses(&dry.join("refined/poses.tum")).unwrap());
+    let frames = report["frames"].as_array().unwrap();
+    let is_sure = |k: &usize| frames[*k]["flag"] == "photometric";
+    let sure: Vec<usize> = (0..frames.len()).filter(is_sure).collect();
+    assert!(sure.len() >= 30, "{}", sure.len());
+    let of = |poses: &[Pose]| -> Vec<Pose> { sure.iter().map(|k| poses[*k]).collect() };
+    let wall = (survey.surface.as_ref(), &survey.camera);
+    let error = wall_error(wall.0, wall.1, &of(&poses), &of(&truth)).unwrap();
+    assert!(error.px.rms < 0.2, "{:?}", error.px);
+}

@@ -92,7 +92,9 @@ pub use points::wall_points::WallPoints;
 pub use problem::unknown_texture::UnknownTexture;
 pub use reading_search::{FittingReadings, ReadingSearchError, search_readings};
 pub use refined::Refined;
-pub use report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
+pub use report::{
+    FrameFlag, FrameReport, HiddenBand, LevelReport, PoseReport, RefineReport, StageTime,
+};
 pub use solver::solve_record::{SolveRecord, StepRecord};
 pub use solver::stopping::StopReason;
 pub use uncertainty::calibration_report::{CalibrationReport, UnknownReport};

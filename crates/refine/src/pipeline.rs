@@ -60,40 +60,89 @@ pub fn refine_with_checkpoint<'a>(
     checkpoint: Option<&mut Checkpoint>,
     progress: &Arc<dyn Progress>,
 ) -> Result<Refined, RefineError> {
-    let setup = Setup::new(input.into(), options)?;
+    let input = input.into();
     let mut session = Session::new(checkpoint, progress);
-    let state = session.restore(&setup)?;
-    if options.photometry == Photometry::Normalised {
+    let mut snapshot = session.snapshot()?;
+    let known = snapshot.as_ref().map(|snapshot| &snapshot.hidden_bands);
+    let mut hidden_bands = known.cloned().unwrap_or_default();
+    loop {
+        let mut ignored = input.ignored.clone();
+        for band in &hidden_bands {
+            ignored.add(input.surface.as_ref(), Some(*band), None);
+        }
+        let without_bands = RefineInput {
+            ignored: &ignored,
+            ..input.clone()
+        };
+        let setup = Setup {
+            hidden_bands,
+            ..Setup::new(without_bands, options)?
+        };
+        let state = match snapshot.take() {
+            Some(snapshot) => session.restore(&setup, snapshot),
+            None => begin(&setup),
+        };
+        match run_stages(&setup, state, &mut session)? {
+            Outcome::Refined(refined) => {
+                progress.leave_job();
+                return Ok(*refined);
+            }
+            Outcome::Hidden(bands) => hidden_bands = bands,
+        }
+    }
+}
+
+/// The end of a run through the stages.
+enum Outcome {
+    /// The result.
+    Refined(Box<Refined>),
+    /// The bands along the tunnel without which all is to be done again: angles θ from and to,
+    /// radians.
+    Hidden(Vec<[f64; 2]>),
+}
+
+/// Runs the stages that are left.
+fn run_stages(
+    setup: &Setup,
+    state: PipelineState,
+    session: &mut Session,
+) -> Result<Outcome, RefineError> {
+    if setup.options.photometry == Photometry::Normalised {
         setup.frames.set_light(Light::Normalised);
     }
-    let mut estimation = Estimation::new(state.unwrap_or_else(|| begin(&setup)));
+    let mut estimation = Estimation::new(state);
     while let Some(stage) = estimation.state.stages.front().copied() {
         // The solution that the assessment uses is no part of a snapshot.
         if estimation.solution.is_none() {
-            session.keep_if_due(&setup, || estimation.state.clone())?;
+            session.keep_if_due(setup, || estimation.state.clone())?;
         }
-        session.enter_stage(&setup, &estimation.state);
-        let ended = match run_stage(stage, &setup, estimation, &mut session) {
+        session.enter_stage(setup, &estimation.state);
+        let ended = match run_stage(stage, setup, estimation, session) {
             Ok(estimation) => Some(estimation),
             Err(RefineError::Problem(ProblemError::Factor { .. })) => None,
             Err(error) => return Err(error),
         };
         let fits = ended.as_ref().is_some_and(|ended| fits_light(stage, ended));
         estimation = match ended {
-            _ if !fits && may_normalise(&setup) => {
+            _ if !fits && may_normalise(setup) => {
                 setup.frames.set_light(Light::Normalised);
-                Estimation::new(begin(&setup))
+                Estimation::new(begin(setup))
             }
+            Some(Estimation {
+                state:
+                    PipelineState {
+                        hidden_bands: Some(bands),
+                        ..
+                    },
+                ..
+            }) => return Ok(Outcome::Hidden(bands)),
             Some(ended) => ended.without_first_stage(),
             // Poses that nothing determines are those given.
-            None => {
-                session.progress.leave_job();
-                return Ok(without_solution(&setup, &mut session));
-            }
+            None => return Ok(Outcome::Refined(Box::new(without_solution(setup, session)))),
         };
     }
-    session.progress.leave_job();
-    estimation.refined.ok_or(RefineError::NoOverlap)
+    let refined = estimation.refined.ok_or(RefineError::NoOverlap)?;
+    Ok(Outcome::Refined(Box::new(refined)))
 }
 
 /// True if local normalisation may take the place of a model of light that does not hold.
@@ -132,6 +181,7 @@ fn begin(setup: &Setup) -> PipelineState {
         over: Vec::new(),
         noise: 0.0,
         has_common_light: true,
+        hidden_bands: None,
         dispersion: 1.0,
         solved: frames.clone(),
         frames,

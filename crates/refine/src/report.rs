@@ -113,6 +113,37 @@ pub struct StageTime {
     pub seconds: f64,
 }
 
+/// A band along the tunnel that was left out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct HiddenBand {
+    /// From, degrees of θ.
+    pub angle_from_deg: f64,
+    /// To; beyond 360 across θ = 0.
+    pub angle_to_deg: f64,
+}
+
+impl HiddenBand {
+    /// The band between two angles, radians.
+    pub(crate) fn between(angles: [f64; 2]) -> Self {
+        let [angle_from_deg, angle_to_deg] = angles.map(f64::to_degrees);
+        Self {
+            angle_from_deg,
+            angle_to_deg,
+        }
+    }
+
+    /// What was found, with the line of survey.toml that leaves the band out.
+    pub fn sentence(&self) -> String {
+        let (from, to) = (self.angle_from_deg, self.angle_to_deg.rem_euclid(360.0));
+        format!(
+            "between θ = {from:.0}° and {to:.0}° most frames show something else than the wall, as \
+             on water that mirrors it: this part is left out, as with `ignore = [{{ theta_deg = \
+             [{from:.0}, {to:.0}] }}]` in [tunnel]"
+        )
+    }
+}
+
 /// The whole report.
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
@@ -148,6 +179,10 @@ pub struct RefineReport {
     /// The wall where frames show something else and were left out, if any frame is photometric.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub masked: Option<MaskedReport>,
+    /// The bands along the tunnel where most frames show something else, as a mirror of water: they
+    /// were left out as if `[tunnel] ignore` had them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hidden_bands: Vec<HiddenBand>,
     /// The bend of a tunnel that was planned straight, if it was found to have one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bend: Option<BendReport>,

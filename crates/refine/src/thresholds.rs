@@ -296,9 +296,7 @@ pub mod stopping {
     /// steps. Chosen by: unknown.
     pub const INTERMEDIATE_STEP_PX: f64 = 0.01;
     /// Step at which a solve that another one follows ends, multiples of the uncertainty. Higher:
-    /// fewer steps. Chosen by: a step of this length leaves one that is far below σ. Tracking with
-    /// it takes 0.9 of the time (18 surveys, the same verdicts), and a fifth to a third where the
-    /// camera is estimated, too: few frames hardly tell the lens.
+    /// fewer steps. Chosen by: unknown.
     pub const INTERMEDIATE_STEP_SIGMA: f64 = 2.0;
 }
 
@@ -420,6 +418,25 @@ pub mod aliasing {
     ///
     /// Chosen by: unknown.
     pub const MAX_PERIOD_DIFFERENCE: f64 = 0.1;
+}
+
+/// Thresholds of `validation/hidden_bands.rs`.
+pub mod hidden_bands {
+    /// Least width of a band along the tunnel that is left out as a whole, radians.
+    ///
+    /// Higher: wider ones are left to the outlier mask, tile by tile.
+    ///
+    /// Chosen by: half of a usual field of view. Beside narrower ones every frame shows wall.
+    pub const MIN_WIDTH_RAD: f64 = std::f64::consts::FRAC_PI_6;
+
+    /// Shares of a column's tiles that are hidden: from which on it belongs to a band beside it, and
+    /// from which on there is one.
+    ///
+    /// Higher: bands end earlier at their edges; fewer bands are found.
+    ///
+    /// Chosen by: without any band the share is some hundredths, up to a half in pictures along the
+    /// tunnel; at a mirror's edge a seventh, within it 0.7 to 1.
+    pub const HIDDEN_SHARES: [f64; 2] = [0.1, 0.7];
 }
 
 /// Thresholds of `validation/repair.rs`.

@@ -158,9 +158,10 @@ fn summary(check: &Check) -> String {
         (
             "texture",
             Some(format!(
-                "gradient {:.2} grey levels per px, noise {:.1}: a frame can be registered to \
-                 {:.4} px at best",
-                pictures.slope_grey_per_px, pictures.noise_grey, pictures.sigma_px
+                "gradient {:.2} grey levels per px, noise {:.1}: {}",
+                pictures.slope_grey_per_px,
+                pictures.noise_grey,
+                pictures.describe_registration(4)
             )),
         ),
         (

@@ -157,6 +157,9 @@ fn print_wall(report: &RefineReport, out: &Path, terminal: &Terminal) {
              be"
         ));
     }
+    for band in &report.hidden_bands {
+        terminal.warn(format!("  {}", band.sentence()));
+    }
     if let Some(masked) = report.masked.as_ref().filter(|masked| masked.area_m2 > 0.0) {
         terminal.say(format!(
             "  most frames show something else than the wall on {:.2} m² ({:.2} %): left out, \

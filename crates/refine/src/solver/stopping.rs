@@ -19,11 +19,12 @@ pub struct Stopping {
 
 impl Stopping {
     /// The rule of the solves of single frames and windows in tracking; the global solve does the
-    /// rest.
+    /// rest. A step within its own σ tells nothing, and few frames tell little of a camera that is
+    /// estimated, too.
     pub const TRACKING: Self = Self {
         max_iterations: MAX_SOLVE_ITERATIONS,
         step_px: STEP_TOLERANCE_PX,
-        step_sigma: INTERMEDIATE_STEP_SIGMA,
+        step_sigma: 1.0,
     };
 
     /// The rule of a solve at a pyramid level that only brings the estimate close for the next one.

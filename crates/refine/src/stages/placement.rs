@@ -5,7 +5,9 @@ use crate::options::Photometry;
 use crate::parameters::calibration::Datum;
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::refined::Refined;
-use crate::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
+use crate::report::{
+    FrameFlag, FrameReport, HiddenBand, LevelReport, PoseReport, RefineReport, StageTime,
+};
 use crate::stages::setup::Setup;
 use crate::stages::state::GlobalSolve;
 use crate::uncertainty::bend_report::BendReport;
@@ -239,6 +241,10 @@ impl Placement {
                 shape: parts.shape,
                 masked: (masked.as_ref())
                     .map(|masked| MaskedReport::new(masked, self.nominal.as_ref(), scale)),
+                hidden_bands: (setup.hidden_bands.iter())
+                    .filter(|_| !photometric.is_empty())
+                    .map(|band| HiddenBand::between(*band))
+                    .collect(),
                 bend: (self.bend.zip(parts.bend_sigma_per_m))
                     .map(|(bend, sigma_per_m)| BendReport::new(bend, sigma_per_m)),
                 points,

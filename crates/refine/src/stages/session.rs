@@ -37,21 +37,23 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Takes the state from the checkpoint, if it has one, and resumes light and stopwatch.
+    /// The snapshot in the checkpoint, if it has one.
     ///
     /// # Errors
     /// [`ProblemError::Checkpoint`] if it is damaged.
-    pub fn restore(&mut self, setup: &Setup) -> Result<Option<PipelineState>, ProblemError> {
-        let Some(checkpoint) = &self.checkpoint else {
-            return Ok(None);
-        };
-        let Some(snapshot) = checkpoint.state::<Snapshot>(NAME)? else {
-            return Ok(None);
-        };
+    pub fn snapshot(&self) -> Result<Option<Snapshot>, ProblemError> {
+        match &self.checkpoint {
+            Some(checkpoint) => Ok(checkpoint.state(NAME)?),
+            None => Ok(None),
+        }
+    }
+
+    /// Resumes light and stopwatch from a snapshot, and returns its state.
+    pub fn restore(&mut self, setup: &Setup, snapshot: Snapshot) -> PipelineState {
         setup.frames.set_light(snapshot.light);
         self.timings = snapshot.timings;
         self.before_s = snapshot.elapsed_s;
-        Ok(Some(snapshot.state))
+        snapshot.state
     }
 
     /// Keeps the state in the checkpoint if it is time; `state` is only asked for then.
@@ -70,6 +72,7 @@ impl<'a> Session<'a> {
             let snapshot = Snapshot {
                 state: state(),
                 light: setup.frames.light(),
+                hidden_bands: setup.hidden_bands.clone(),
                 timings: self.timings.clone(),
                 elapsed_s,
             };

@@ -47,6 +47,9 @@ pub struct Setup<'a> {
     pub held_displacement: Option<RadialField>,
     /// The wall that fits measured points, if there are any.
     pub wall: Option<FittedWall>,
+    /// The bands along the tunnel that have turned out to be hidden, angles θ from and to, radians;
+    /// the input ignores them.
+    pub hidden_bands: Vec<[f64; 2]>,
 }
 
 impl<'a> Setup<'a> {
@@ -96,6 +99,7 @@ impl<'a> Setup<'a> {
             displacement: input.displacement.cloned(),
             held_displacement: input.displacement.cloned(),
             wall: None,
+            hidden_bands: Vec::new(),
             input,
             options,
             shape_sigma_m,

@@ -15,6 +15,7 @@ use crate::stages::state::{Estimation, GlobalSolve, LastSolve, PipelineState};
 use crate::tracking::shading_correction::correct_once;
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
+use crate::validation::hidden_bands::find_hidden_bands;
 use crate::validation::inconsistent_frames::reject_disagreeing_frames;
 
 /// Solves at full size after which the strengths of the shape are not learned again.
@@ -82,6 +83,11 @@ pub fn run<'a>(
         joint: solution.problem.is_joint(),
         record: solution.record.clone(),
     });
+    if plan.sampling.level == 0 {
+        let masked = solution.problem.masked_wall();
+        state.hidden_bands =
+            find_hidden_bands(&masked, context.nominal.as_ref(), &setup.hidden_bands);
+    }
     if has_solve_ahead(state) && setup.frames.shading().is_some() {
         correct_once(&context, setup.options, &state.frames)?;
     }

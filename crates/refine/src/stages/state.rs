@@ -28,6 +28,9 @@ pub struct PipelineState {
     pub noise: f64,
     /// False if the light has turned out to be no shading that all frames have in common.
     pub has_common_light: bool,
+    /// All bands along the tunnel that are hidden, angles θ from and to, radians, if the last solve
+    /// has found more of them.
+    pub hidden_bands: Option<Vec<[f64; 2]>>,
     /// Dispersion of the residuals ([`crate::uncertainty::model_error`]), once it is known.
     pub dispersion: f64,
     /// The frames: estimates (none before they are tracked) and rejection reasons.
@@ -88,6 +91,8 @@ pub struct Snapshot {
     pub state: PipelineState,
     /// Treatment of the frames' light.
     pub light: Light,
+    /// Bands along the tunnel that are left out: angles θ from and to, radians.
+    pub hidden_bands: Vec<[f64; 2]>,
     /// Stages that are over, with their times.
     pub timings: Vec<StageTime>,
     /// Seconds spent on the stage under way.
