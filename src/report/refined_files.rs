@@ -5,8 +5,8 @@ use crate::evaluate::deformation::{SectionDeformation, read_sections};
 use crate::files::limits::MAX_REPORT_BYTES;
 use crate::files::read_text;
 use crate::refine::{
-    FrameReport, LengthScale, LevelReport, MaskedReport, PointsReport, PriorTest, ShapeReport,
-    StageTime, SurveyVerdict, read_covariances,
+    FrameReport, HiddenBand, LengthScale, LevelReport, MaskedReport, PointsReport, PriorTest,
+    ShapeReport, StageTime, SurveyVerdict, read_covariances,
 };
 use crate::survey::{MASKED_FILE, MaskedWall, OverlayReport, SkippedFrame, Survey};
 use crate::trajectory::{Pose, poses_of};
@@ -49,6 +49,9 @@ pub struct Refinement {
     /// The wall that was left out; none in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked: Option<MaskedReport>,
+    /// The bands along the tunnel that were left out as a whole; none in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hidden_bands: Vec<HiddenBand>,
     /// Frames that were left out because they cannot be read.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub skipped_frames: Vec<SkippedFrame>,

@@ -305,8 +305,8 @@ fn wall_that_moves_is_ignored_if_it_is_said_to() {
     assert!(error_px < 1.5 * sigma_px, "{error_px} {sigma_px}");
 }
 
-/// A tunnel with water on 70° of its invert, that mirrors another wall: the frames of a wider tunnel
-/// of the same poses show through it.
+/// A tunnel with water on 70° of its invert, that mirrors another wall: the frames of a wider
+/// tunnel of the same poses show through it.
 #[test]
 fn water_that_mirrors_is_left_out_as_a_band() {
     const WATER_DEG: std::ops::Range<f64> = 145.0..215.0;

@@ -39,9 +39,9 @@ fn start(arguments: &[&str]) -> Child {
 }
 
 /// Starts the command and kills it at random moments, at least until one run has continued another
-/// one, and then lets it end. Each run is given more time than the last: the machine may have
-/// become busier.
-fn killed(arguments: &[&str], takes: Duration, seed: u64) {
+/// one, and then lets it end. The machine may have become busier or less busy: after a run that was
+/// killed the next is given more time, after one that has ended less than that one took.
+fn killed(arguments: &[&str], mut takes: Duration, seed: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut kills, mut resumed) = (0, 0);
     for run in 0.. {
@@ -50,11 +50,17 @@ fn killed(arguments: &[&str], takes: Duration, seed: u64) {
             "of {run} runs {kills} were killed and {resumed} had continued"
         );
         let mut child = start(arguments);
-        let patience = 1.0 + f64::from(run) / f64::from(KILLS);
-        std::thread::sleep(takes.mul_f64(patience * rng.random_range(0.1..0.8)));
+        let patience = takes.mul_f64(rng.random_range(0.1..0.8));
+        std::thread::sleep(patience);
         child.kill().unwrap();
         let output = child.wait_with_output().unwrap();
-        kills += u32::from(!output.status.success());
+        let has_ended = output.status.success();
+        takes = if has_ended {
+            patience
+        } else {
+            takes.mul_f64(1.0 + 1.0 / f64::from(KILLS))
+        };
+        kills += u32::from(!has_ended);
         resumed += u32::from(
             String::from_utf8_lossy(&output.stdout).contains("continuing the interrupted run"),
         );

@@ -133,7 +133,8 @@ impl HiddenBand {
         }
     }
 
-    /// What was found, with the line of survey.toml that leaves the band out.
+    /// The finding in a sentence without a full stop, with the line of survey.toml that leaves the
+    /// band out.
     pub fn sentence(&self) -> String {
         let (from, to) = (self.angle_from_deg, self.angle_to_deg.rem_euclid(360.0));
         format!(

@@ -429,8 +429,8 @@ pub mod hidden_bands {
     /// Chosen by: half of a usual field of view. Beside narrower ones every frame shows wall.
     pub const MIN_WIDTH_RAD: f64 = std::f64::consts::FRAC_PI_6;
 
-    /// Shares of a column's tiles that are hidden: from which on it belongs to a band beside it, and
-    /// from which on there is one.
+    /// Shares of a column's tiles that are hidden: from which on it belongs to a band beside it,
+    /// and from which on there is one.
     ///
     /// Higher: bands end earlier at their edges; fewer bands are found.
     ///

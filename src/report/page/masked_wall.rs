@@ -20,6 +20,7 @@ pub fn section(data: &PageData) -> Result<Option<Markup>, ReportError> {
     let Some(masked) = refinement.and_then(|refinement| refinement.masked.as_ref()) else {
         return Ok(None);
     };
+    let bands = refinement.map_or(&[][..], |refinement| &refinement.hidden_bands);
     let map = match &report.masked {
         Some(map) => draw(map)?,
         None => Markup::default(),
@@ -31,6 +32,9 @@ pub fn section(data: &PageData) -> Result<Option<Markup>, ReportError> {
             (short(masked.area_m2)) " m², " (short(100.0 * masked.share)) " % of the "
             (short(masked.seen_m2)) " m² that two frames or more see. No deformation is stated \
              there."
+        }
+        @for band in bands {
+            p { "Left out as a whole: " (band.sentence()) "." }
         }
         (map)
         @if !masked.places.is_empty() { (places(masked)) }

@@ -14,9 +14,9 @@ use tunnelstitch_geometry::surface::Surface;
 /// Columns around the section, by which bands are found.
 const COLUMNS: usize = 72;
 
-/// Finds all bands: angles θ from and to, radians, the second beyond 2π across θ = 0; `known`: those
-/// that are left out already. None if hardly more is hidden; and where it is a third of the section
-/// or more, for then it is the poses that are wrong.
+/// Finds all bands: angles θ from and to, radians, the second beyond 2π across θ = 0; `known`:
+/// those that are left out already. None if hardly more is hidden; and where it is a third of the
+/// section or more, for then it is the poses that are wrong.
 pub fn find_hidden_bands(
     masked: &MaskedWall,
     surface: &dyn Surface,
@@ -68,8 +68,8 @@ fn hidden_shares(masked: &MaskedWall) -> Vec<f64> {
 }
 
 /// Hides the columns of which most is hidden, and those beside them of which more is than of the
-/// rest of the section (hysteresis): at the edge of a band, and where a mirror shows the same to all.
-/// Together, half of them must be.
+/// rest of the section (hysteresis): at the edge of a band, and where a mirror shows the same to
+/// all. Together, half of them must be.
 ///
 /// Source: J. Canny, "A computational approach to edge detection", IEEE Transactions on Pattern
 /// Analysis and Machine Intelligence 8(6), 1986.
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(bands_deg(&[], across), [[325.0, 385.0]]);
     }
 
-    /// What is left out already is no news, nor is its edge; the other half of it is.
+    /// A band that is left out already is no news, nor is its edge; the other half of it is.
     #[test]
     fn bands_grow() {
         let known = [[145f64.to_radians(), 180f64.to_radians()]];
