@@ -83,7 +83,7 @@ pub fn run<'a>(
         joint: solution.problem.is_joint(),
         record: solution.record.clone(),
     });
-    if plan.sampling.level == 0 {
+    if plan.sampling.level == 0 && state.frames.has_majority() {
         let masked = solution.problem.masked_wall();
         state.hidden_bands =
             find_hidden_bands(&masked, context.nominal.as_ref(), &setup.hidden_bands);
