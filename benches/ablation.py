@@ -47,8 +47,6 @@ EDITS = [
     ("alias test", "validation/alias_search.rs",
      ") -> Result<Vec<GaugeMotion>, ProblemError> {\n    let side",
      ") -> Result<Vec<GaugeMotion>, ProblemError> {\n    if true { return Ok(Vec::new()); }\n    let side"),
-    ("solves between the coarsest and full size", "stages/plan.rs", "for level in (0..=handover).rev() {",
-     "for level in (0..=handover).rev().filter(|level| [0, handover].contains(level)) {"),
     ("solve where tracking ended", "stages/plan.rs", "stages.push_back(Stage::Solve(plan));",
      "if level < handover || handover == 0 { stages.push_back(Stage::Solve(plan)); }"),
     ("outlier mask", "samples/outlier_mask.rs", "self.tiles.extend(outliers.concat());", "let _ = outliers;"),
