@@ -2,15 +2,13 @@
 
 use crate::error::RefineError;
 use crate::input::RefineInput;
-use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::options::{Photometry, RefineOptions};
-use crate::parameters::calibration::Kappa;
-use crate::parameters::unseen_errors::UnseenErrors;
 use crate::refined::Refined;
 use crate::stages::assess::without_solution;
-use crate::stages::plan::{Stage, plan_stages};
+use crate::stages::begin::begin;
+use crate::stages::plan::Stage;
 use crate::stages::run::run_stage;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
@@ -167,32 +165,4 @@ fn fits_light(stage: Stage, ended: &Estimation) -> bool {
         .filter(|reason| !reason.as_ref().is_some_and(RejectionReason::shows_nothing));
     let registered = rejections.iter().filter(|reason| reason.is_none()).count();
     stage != Stage::Track || 2 * registered >= shown.count()
-}
-
-/// The state before the first stage.
-fn begin(setup: &Setup) -> PipelineState {
-    let frames = FrameStates {
-        estimates: Vec::new(),
-        rejections: vec![None; setup.count()],
-        kappa: Kappa::zeros(),
-    };
-    PipelineState {
-        stages: plan_stages(setup.options, setup.handover_level()),
-        over: Vec::new(),
-        noise: 0.0,
-        has_common_light: true,
-        hidden_bands: None,
-        dispersion: 1.0,
-        solved: frames.clone(),
-        frames,
-        kappa: Kappa::zeros(),
-        free: setup.calibration.free,
-        tested: setup.calibration.tested,
-        shape: None,
-        unseen: UnseenErrors::default(),
-        tracking: None,
-        solve: None,
-        levels: Vec::new(),
-        unobservable: Vec::new(),
-    }
 }

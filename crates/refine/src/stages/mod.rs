@@ -14,6 +14,7 @@
 //! | dispatch | [`run`](mod@run) |
 
 pub mod assess;
+pub mod begin;
 pub mod correct_shading;
 pub mod placement;
 pub mod plan;

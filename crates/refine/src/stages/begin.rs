@@ -1,0 +1,36 @@
+//! The beginning of a refinement.
+
+use crate::model::frame_states::FrameStates;
+use crate::parameters::calibration::Kappa;
+use crate::parameters::unseen_errors::UnseenErrors;
+use crate::stages::plan::plan_stages;
+use crate::stages::setup::Setup;
+use crate::stages::state::PipelineState;
+
+/// The state before the first stage.
+pub fn begin(setup: &Setup) -> PipelineState {
+    let frames = FrameStates {
+        estimates: Vec::new(),
+        rejections: vec![None; setup.count()],
+        kappa: Kappa::zeros(),
+    };
+    PipelineState {
+        stages: plan_stages(setup.options, setup.handover_level()),
+        over: Vec::new(),
+        noise: 0.0,
+        has_common_light: true,
+        hidden_bands: None,
+        dispersion: 1.0,
+        solved: frames.clone(),
+        frames,
+        kappa: Kappa::zeros(),
+        free: setup.calibration.free,
+        tested: setup.calibration.tested,
+        shape: None,
+        unseen: UnseenErrors::default(),
+        tracking: None,
+        solve: None,
+        levels: Vec::new(),
+        unobservable: Vec::new(),
+    }
+}
