@@ -6,6 +6,7 @@ use nalgebra::Vector2;
 use serde_json::Value;
 use std::path::Path;
 use tunnelstitch::evaluate::wall_error;
+use tunnelstitch::surface::WallPoint;
 use tunnelstitch::survey::Survey;
 use tunnelstitch::trajectory::{Pose, poses_of};
 
@@ -268,6 +269,30 @@ fn a_mask_is_recognised_reported_recorded_and_kept() {
     assert_eq!(calibrated.ignored, Survey::open(&survey).unwrap().ignored);
 }
 
+/// Angles of the water on the invert, degrees.
+const WATER_DEG: std::ops::Range<f64> = 145.0..215.0;
+
+/// Paints water into the frames of a tunnel of 3 m radius with true poses: `water` of a frame's
+/// index gives the grey level of a pixel (u, v) at its point of the wall, if that is to change.
+fn paint_water<P: Fn([u32; 2], WallPoint) -> Option<u8>>(
+    survey: &Survey,
+    water: impl Fn(usize) -> P,
+) {
+    let truth = poses_of(survey.truth.as_deref().unwrap());
+    for (k, (frame, pose)) in survey.frames.iter().zip(&truth).enumerate() {
+        let water = water(k);
+        let mut picture = image::open(&frame.path).unwrap().to_luma8();
+        for (u, v, pixel) in picture.enumerate_pixels_mut() {
+            let ray = pose.r_wc * survey.camera.ray(f64::from(u), f64::from(v)).unwrap();
+            let wall = survey.surface.hit(&pose.t_wc, &ray).unwrap().wall;
+            if WATER_DEG.contains(&(wall.s_m / 3.0).to_degrees()) {
+                pixel.0[0] = water([u, v], wall).unwrap_or(pixel.0[0]);
+            }
+        }
+        picture.save(&frame.path).unwrap();
+    }
+}
+
 /// Water along the invert, at a different place in every frame.
 #[test]
 fn wall_that_moves_is_ignored_if_it_is_said_to() {
@@ -275,22 +300,16 @@ fn wall_that_moves_is_ignored_if_it_is_said_to() {
     let path = simulated(dir.path(), "survey", &["--light", "even"]);
     let survey = Survey::open(&path).unwrap();
     let truth = poses_of(survey.truth.as_deref().unwrap());
-    for (frame, pose) in survey.frames.iter().zip(&truth) {
-        let mut picture = image::open(&frame.path).unwrap().to_luma8();
-        for (u, v, pixel) in picture.enumerate_pixels_mut() {
-            let ray = pose.r_wc * survey.camera.ray(f64::from(u), f64::from(v)).unwrap();
-            let wall = survey.surface.hit(&pose.t_wc, &ray).unwrap().wall;
-            let theta_deg = (wall.s_m / 3.0).to_degrees();
-            if (145.0..215.0).contains(&theta_deg) && (0.4..1.4).contains(&wall.h_m) {
-                // Waves that run along with the camera, half as fast again, a tenth of a metre
-                // long.
-                let at = Vector2::new(wall.s_m, wall.h_m - 1.5 * pose.t_wc.y);
-                let wave = (63.0 * at.y + 9.0 * at.x).sin() + (41.0 * at.x - 17.0 * at.y).sin();
-                pixel.0[0] = (110.0 + 40.0 * wave) as u8;
-            }
+    paint_water(&survey, |k| {
+        let y = truth[k].t_wc.y;
+        move |_, wall| {
+            // Waves that run along with the camera, half as fast again, a tenth of a metre long.
+            let at = Vector2::new(wall.s_m, wall.h_m - 1.5 * y);
+            let wave = (63.0 * at.y + 9.0 * at.x).sin() + (41.0 * at.x - 17.0 * at.y).sin();
+            let is_pool = (0.4..1.4).contains(&wall.h_m);
+            is_pool.then_some((110.0 + 40.0 * wave) as u8)
         }
-        picture.save(&frame.path).unwrap();
-    }
+    });
     let (_, unsure) = certainty(&refined(&path).0);
     assert!(unsure > 0);
     edit(
@@ -309,7 +328,6 @@ fn wall_that_moves_is_ignored_if_it_is_said_to() {
 /// tunnel of the same poses show through it.
 #[test]
 fn water_that_mirrors_is_left_out_as_a_band() {
-    const WATER_DEG: std::ops::Range<f64> = 145.0..215.0;
     let dir = tempfile::tempdir().unwrap();
     let draw = |name: &str, radius_m: &str| {
         let options = ["--frames", "36", "--size", "240x180", "--noise", "1"];
@@ -322,26 +340,10 @@ fn water_that_mirrors_is_left_out_as_a_band() {
     let truth = poses_of(survey.truth.as_deref().unwrap());
     let other = Survey::open(&below).unwrap();
     assert_eq!(truth, poses_of(other.truth.as_deref().unwrap()));
-    let mut names: Vec<_> = std::fs::read_dir(dry.join("frames"))
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name())
-        .collect();
-    names.sort();
-    for (name, pose) in names.iter().zip(&truth) {
-        let path = dry.join("frames").join(name);
-        let mut frame = image::open(&path).unwrap().to_luma8();
-        let mirrored = image::open(below.join("frames").join(name)).unwrap();
-        let mirrored = mirrored.to_luma8();
-        for (x, y, pixel) in frame.enumerate_pixels_mut() {
-            let ray = pose.r_wc * survey.camera.ray(f64::from(x), f64::from(y)).unwrap();
-            let hit = survey.surface.hit(&pose.t_wc, &ray).unwrap();
-            let theta_deg = survey.surface.angle_rad(hit.wall.s_m).to_degrees();
-            if WATER_DEG.contains(&theta_deg.rem_euclid(360.0)) {
-                *pixel = *mirrored.get_pixel(x, y);
-            }
-        }
-        frame.save(&path).unwrap();
-    }
+    paint_water(&survey, |k| {
+        let mirrored = image::open(&other.frames[k].path).unwrap().to_luma8();
+        move |[u, v], _| Some(mirrored.get_pixel(u, v).0[0])
+    });
     let (report, _) = refined(&dry);
     let bands = report["hidden_bands"].as_array().unwrap();
     let [band] = &bands[..] else {
@@ -357,7 +359,7 @@ fn water_that_mirrors_is_left_out_as_a_band() {
     let sure: Vec<usize> = (0..frames.len()).filter(is_sure).collect();
     assert!(sure.len() >= 30, "{}", sure.len());
     let of = |poses: &[Pose]| -> Vec<Pose> { sure.iter().map(|k| poses[*k]).collect() };
-    let wall = (survey.surface.as_ref(), &survey.camera);
-    let error = wall_error(wall.0, wall.1, &of(&poses), &of(&truth)).unwrap();
+    let (poses, truth) = (of(&poses), of(&truth));
+    let error = wall_error(survey.surface.as_ref(), &survey.camera, &poses, &truth).unwrap();
     assert!(error.px.rms < 0.2, "{:?}", error.px);
 }

@@ -1,4 +1,8 @@
 //! The pipeline: the stages of a refinement, one after another.
+//!
+//! It begins again where a stage shows that what all of them rest on does not hold: with local
+//! normalisation where no model of the light fits, and without the bands along the tunnel that are
+//! hidden ([`crate::samples::hidden_bands`]).
 
 use crate::error::RefineError;
 use crate::input::RefineInput;
@@ -127,11 +131,7 @@ fn run_stages(
                 Estimation::new(begin(setup))
             }
             Some(Estimation {
-                state:
-                    PipelineState {
-                        hidden_bands: Some(bands),
-                        ..
-                    },
+                hidden_bands: Some(bands),
                 ..
             }) => return Ok(Outcome::Hidden(bands)),
             Some(ended) => ended.without_first_stage(),

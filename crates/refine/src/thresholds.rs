@@ -420,7 +420,7 @@ pub mod aliasing {
     pub const MAX_PERIOD_DIFFERENCE: f64 = 0.1;
 }
 
-/// Thresholds of `validation/hidden_bands.rs`.
+/// Thresholds of `samples/hidden_bands.rs`.
 pub mod hidden_bands {
     /// Least width of a band along the tunnel that is left out as a whole, radians.
     ///

@@ -9,11 +9,13 @@
 //!                                          TileCoverage, stretch by stretch
 //! ```
 //!
+//! [`hidden_bands`] finds where the outlier mask has left out most of the wall along the tunnel.
 //! [`sampling`] holds the settings of a problem. [`point_sampler`] projects single wall points and
 //! is used by tracking and validation.
 
 pub mod excluded_tiles;
 pub mod footprints;
+pub mod hidden_bands;
 pub mod observer;
 pub mod observer_marks;
 pub mod outlier_mask;

@@ -19,7 +19,6 @@ pub fn begin(setup: &Setup) -> PipelineState {
         over: Vec::new(),
         noise: 0.0,
         has_common_light: true,
-        hidden_bands: None,
         dispersion: 1.0,
         solved: frames.clone(),
         frames,

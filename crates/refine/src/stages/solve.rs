@@ -5,6 +5,7 @@ use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::problem::photometric_problem::PhotometricProblem;
+use crate::samples::hidden_bands::find_hidden_bands;
 use crate::solver::argmin_glue::{self, Observation};
 use crate::solver::gauss_newton::{Solution, SolveState};
 use crate::stages::plan::{SolvePlan, Stage};
@@ -15,7 +16,6 @@ use crate::stages::state::{Estimation, GlobalSolve, LastSolve, PipelineState};
 use crate::tracking::shading_correction::correct_once;
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
-use crate::validation::hidden_bands::find_hidden_bands;
 use crate::validation::inconsistent_frames::reject_disagreeing_frames;
 
 /// Solves at full size after which the strengths of the shape are not learned again.
@@ -85,7 +85,7 @@ pub fn run<'a>(
     });
     if plan.sampling.level == 0 && state.frames.has_majority() {
         let masked = solution.problem.masked_wall();
-        state.hidden_bands =
+        estimation.hidden_bands =
             find_hidden_bands(&masked, context.nominal.as_ref(), &setup.hidden_bands);
     }
     if has_solve_ahead(state) && setup.frames.shading().is_some() {

@@ -28,9 +28,6 @@ pub struct PipelineState {
     pub noise: f64,
     /// False if the light has turned out to be no shading that all frames have in common.
     pub has_common_light: bool,
-    /// All bands along the tunnel that are hidden, angles θ from and to, radians, if the last solve
-    /// has found more of them.
-    pub hidden_bands: Option<Vec<[f64; 2]>>,
     /// Dispersion of the residuals ([`crate::uncertainty::model_error`]), once it is known.
     pub dispersion: f64,
     /// The frames: estimates (none before they are tracked) and rejection reasons.
@@ -114,6 +111,7 @@ impl Estimation<'_> {
     pub fn new(state: PipelineState) -> Self {
         Self {
             state,
+            hidden_bands: None,
             solution: None,
             refined: None,
         }
@@ -131,6 +129,9 @@ impl Estimation<'_> {
 pub struct Estimation<'a> {
     /// The state.
     pub state: PipelineState,
+    /// All bands along the tunnel that are hidden, angles θ from and to, radians, if the last solve
+    /// has found more of them: then all is to be done again without them.
+    pub hidden_bands: Option<Vec<[f64; 2]>>,
     /// The last full-size solve. It is held in memory only; no checkpoint is kept between it and
     /// the assessment that uses it.
     pub solution: Option<LastSolve<'a>>,

@@ -17,7 +17,6 @@ pub mod aliasing;
 pub mod alignment;
 pub mod blurred_frames;
 pub mod contradictions;
-pub mod hidden_bands;
 pub mod inconsistent_frames;
 pub mod lucas_kanade_fit;
 pub mod lucas_kanade_template;

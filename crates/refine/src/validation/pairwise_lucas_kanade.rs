@@ -100,9 +100,11 @@ mod tests {
         })
     }
 
-    fn inconsistent(alignments: &[Alignment], frames: usize) -> Vec<usize> {
+    #[track_caller]
+    fn assert_inconsistent(alignments: &[Alignment], frames: usize, expected: &[usize]) {
         let found = find_inconsistent_frames(alignments, frames, &RefineOptions::default());
-        found.into_iter().map(|(frame, _)| frame).collect()
+        let found: Vec<usize> = found.into_iter().map(|(frame, _)| frame).collect();
+        assert_eq!(found, expected, "{alignments:#?}");
     }
 
     #[test]
@@ -123,11 +125,7 @@ mod tests {
             found.iter().all(|pair| pair.correlation > 0.8),
             "{found:#?}"
         );
-        assert_eq!(
-            inconsistent(&found, wall.poses.len()),
-            [0usize; 0],
-            "{found:#?}"
-        );
+        assert_inconsistent(&found, wall.poses.len(), &[]);
     }
 
     /// All joints lie on joints.
@@ -136,7 +134,7 @@ mod tests {
         let wall = TestWall::ring(bricks);
         let poses = displaced_by_a_brick(&wall.poses, 5);
         let found = align(&wall, wall.frames(), &poses);
-        assert_eq!(inconsistent(&found, poses.len()), [5], "{found:#?}");
+        assert_inconsistent(&found, poses.len(), &[5]);
     }
 
     /// Dark in some frames and bright in others, with the wall between as it is.
@@ -144,11 +142,7 @@ mod tests {
     fn glints_and_water_do_not_displace() {
         let (wall, pictures) = faint_wall_with_glints();
         let found = align(&wall, pictures, &wall.poses);
-        assert_eq!(
-            inconsistent(&found, wall.poses.len()),
-            [0usize; 0],
-            "{found:#?}"
-        );
+        assert_inconsistent(&found, wall.poses.len(), &[]);
     }
 
     /// A frame shifted along the tunnel by 10 mm is 1 cm · f / 1 m ≈ 1 px off all it overlaps.
