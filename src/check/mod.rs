@@ -8,9 +8,11 @@
 //! Survey ─┬─ MaskCheck, PosesCheck, OverlapCheck, JitterCheck ─┐
 //!         ├─ PictureCheck (a dozen frames) ────────────────────┼─> Check ── warnings
 //!         ├─ OverlayReport (up to 64 frames) ──────────────────┤
+//!         ├─ DeformationCheck (bound by texture and overlap) ──┤
 //!         └─ Effort (time and memory) ─────────────────────────┘
 //! ```
 
+mod deformation;
 mod effort;
 mod interlacing;
 mod jitter;
@@ -23,6 +25,7 @@ mod run;
 mod statistics;
 mod warnings;
 
+pub use deformation::DeformationCheck;
 pub use effort::{Effort, refine_bytes, refine_s};
 pub use interlacing::interlacing_warning;
 pub use jitter::JitterCheck;

@@ -12,6 +12,8 @@ const MAX_DECODED_FRAMES: usize = 12;
 /// a pixel. Halving filters with `[1 3 3 1]/8` along each axis: along one axis the variance is
 /// `20/64`, and the covariance of neighbours `6/64`.
 const HALVED_NOISE_FACTOR: f64 = 2.0 * (20.0 - 6.0) * 20.0 / (64.0 * 64.0);
+/// Least noise that is assumed, grey levels: that of rounding.
+pub(super) const MIN_NOISE_GREY: f64 = 0.3;
 /// Largest number of faults that are listed.
 const MAX_LISTED_FAULTS: usize = 5;
 
@@ -141,7 +143,7 @@ fn measure(picture: &GreyImage, hidden: f64) -> PictureCheck {
         clipped: 1.0 - known / pixels,
         noise_grey,
         slope_grey_per_px: slope,
-        sigma_px: (slope > 0.0).then(|| noise_grey.max(0.3) / (slope * pixels.sqrt())),
+        sigma_px: (slope > 0.0).then(|| noise_grey.max(MIN_NOISE_GREY) / (slope * pixels.sqrt())),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Result of the check of a survey.
 
+use super::deformation::DeformationCheck;
 use super::effort::Effort;
 use super::jitter::JitterCheck;
 use super::masks::MaskCheck;
@@ -38,6 +39,10 @@ pub struct Check {
     pub jitter: JitterCheck,
     /// Exposure, noise and texture of the frames.
     pub pictures: PictureCheck,
+    /// Deformation of the wall that can be measured; None if the wall is said to be exact, or if
+    /// there is no texture or no overlap.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deformation: Option<DeformationCheck>,
     /// Time and memory that refining and stitching need.
     pub effort: Effort,
     /// Other readings of poses and pictures, if neighbouring frames agree with them only.

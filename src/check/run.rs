@@ -1,5 +1,6 @@
 //! The check of a survey.
 
+use super::deformation::DeformationCheck;
 use super::effort::Effort;
 use super::interlacing::interlacing_warning;
 use super::jitter::JitterCheck;
@@ -63,6 +64,7 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
         overlap,
         px_per_metre,
         pictures,
+        deformation: None,
         effort: Effort::of(survey, px_per_metre),
         readings: None,
         faults,
@@ -72,6 +74,10 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     if check.faults.is_empty() {
         match search_readings(survey) {
             Ok(readings) => check.readings = readings,
+            Err(error) => check.faults.push(error.to_string()),
+        }
+        match DeformationCheck::of(survey, &check.pictures) {
+            Ok(deformation) => check.deformation = deformation,
             Err(error) => check.faults.push(error.to_string()),
         }
     }

@@ -1,5 +1,6 @@
 //! Warnings of a check, each with its remedy.
 
+use super::deformation::DeformationCheck;
 use super::result::Check;
 use crate::frames::UNUSED_UPPER_BITS;
 use crate::refine::FittingReadings;
@@ -27,6 +28,7 @@ pub(super) fn warnings(check: &Check) -> Vec<String> {
         unused_bits(check).or_else(|| dark_frames(check)),
         saturated_frames(check),
         weak_texture(check),
+        (check.deformation.as_ref()).and_then(DeformationCheck::warning),
         uncovered_image(check),
     ];
     all.into_iter().flatten().collect()

@@ -55,6 +55,7 @@
 //!
 //! What each technique contributes is measured by `benches/ablation.py`.
 
+mod deformation_bound;
 mod error;
 mod input;
 mod joint;
@@ -81,6 +82,7 @@ mod uncertainty;
 mod validation;
 mod verdict;
 
+pub use deformation_bound::{DeformationBound, PictureTexture, deformation_bound};
 pub use error::RefineError;
 pub use input::{RefineInput, is_motionless};
 pub use model::problem_error::ProblemError;

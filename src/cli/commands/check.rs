@@ -1,6 +1,6 @@
 //! `tunnelstitch check`: checks a survey in seconds.
 
-use crate::check::{self, Check, MaskCheck, PosesCheck};
+use crate::check::{self, Check, DeformationCheck, MaskCheck, PosesCheck};
 use crate::cli::arguments::PoseReadingArguments;
 use crate::cli::output::{Failure, Terminal, duration_text, json};
 use crate::frames::{PictureFormat, write_picture};
@@ -163,6 +163,10 @@ fn summary(check: &Check) -> String {
                 pictures.noise_grey,
                 pictures.describe_registration(4)
             )),
+        ),
+        (
+            "deformation",
+            (check.deformation.as_ref()).map(DeformationCheck::sentence),
         ),
         (
             "exposure",

@@ -3,8 +3,9 @@
 use super::error::FrameError;
 use super::frame_file::FrameFile;
 use super::frame_set::FrameSet;
+use super::grey::GreyImage;
 use super::local_normalisation::normalise_locally;
-use super::mask::PyramidMask;
+use super::mask::{Mask, PyramidMask};
 use super::pyramid::Pyramid;
 use super::shading::Shading;
 use super::stored_frame::StoredFrame;
@@ -41,7 +42,7 @@ pub struct FrameCache {
 #[derive(Debug)]
 enum Source {
     Files(FrameSet, Box<Camera>),
-    Memory(Vec<Arc<Pyramid>>),
+    Memory(Vec<Arc<Pyramid>>, Option<Arc<Mask>>),
 }
 
 /// Treatment of the frames' light.
@@ -101,14 +102,26 @@ impl FrameCache {
 
     /// Creates a cache of pyramids that are in memory already.
     pub fn of_pyramids(pyramids: Vec<Pyramid>) -> Self {
-        let frames = pyramids.len();
+        Self::in_memory(pyramids.into_iter().map(Arc::new).collect(), None)
+    }
+
+    /// Pictures that are black all over in place of `frames`, of the size of `camera` (at any
+    /// pyramid level of theirs), with their mask; nothing is read.
+    pub fn blank(frames: &FrameSet, camera: &Camera) -> Self {
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let black = GreyImage::new(width, height, vec![0.0; width * height]);
+        let black = Arc::new(Pyramid::new(black, 1));
+        Self::in_memory(vec![black; frames.len()], frames.mask().map(Arc::clone))
+    }
+
+    fn in_memory(pyramids: Vec<Arc<Pyramid>>, mask: Option<Arc<Mask>>) -> Self {
         Self {
-            source: Source::Memory(pyramids.into_iter().map(Arc::new).collect()),
             levels: 1,
             light: RwLock::default(),
-            room: frames,
+            room: pyramids.len(),
             shelf: Mutex::default(),
             stored: Mutex::default(),
+            source: Source::Memory(pyramids, mask),
         }
     }
 
@@ -116,19 +129,17 @@ impl FrameCache {
     pub fn frames(&self) -> usize {
         match &self.source {
             Source::Files(frames, _) => frames.len(),
-            Source::Memory(pyramids) => pyramids.len(),
+            Source::Memory(pyramids, _) => pyramids.len(),
         }
     }
 
     /// The mask at the pyramid level of `camera`; None if there is no mask.
     pub fn mask(&self, camera: &Camera) -> Option<PyramidMask> {
-        match &self.source {
-            Source::Files(frames, _) => {
-                let mask = Arc::clone(frames.mask()?);
-                Some(PyramidMask::for_camera(mask, camera))
-            }
-            Source::Memory(_) => None,
-        }
+        let mask = match &self.source {
+            Source::Files(frames, _) => frames.mask(),
+            Source::Memory(_, mask) => mask.as_ref(),
+        };
+        mask.map(|mask| PyramidMask::for_camera(Arc::clone(mask), camera))
     }
 
     /// Largest number of pyramids held at once.
@@ -164,7 +175,7 @@ impl FrameCache {
     pub fn get(&self, frame: usize) -> Result<Arc<Pyramid>, FrameError> {
         let (frames, camera) = match &self.source {
             Source::Files(frames, camera) => (frames, camera),
-            Source::Memory(pyramids) => return Ok(Arc::clone(&pyramids[frame])),
+            Source::Memory(pyramids, _) => return Ok(Arc::clone(&pyramids[frame])),
         };
         {
             let mut shelf = lock(&self.shelf);

@@ -36,6 +36,8 @@ const BLOCK_FUNCTIONS: usize = FRAME_PARAMETERS;
 const MIN_COLUMNS: usize = BLOCK_FUNCTIONS;
 /// Harmonics of a section that are hardly seen: its mean, cos θ and sin θ.
 const WEAK_HARMONICS: usize = 3;
+/// Orders of the harmonics, cos mθ and sin mθ of each.
+pub const HARMONIC_ORDERS: usize = BLOCK_FUNCTIONS / 2;
 /// Order m of the first harmonic. Those of order 0 and 1 are the radius and the position of the
 /// axis.
 const FIRST_HARMONIC: usize = 2;
@@ -291,6 +293,20 @@ impl ShapeModel {
         }
         values.sort_unstable_by_key(|value| (value.block, value.component));
         values
+    }
+
+    /// The deformation at a point of the wall as a sum of coefficients, block by block: the
+    /// displacement without mean, cos θ and sin θ of the section
+    /// ([`Functions::retain_deformation`]).
+    pub fn deformation_at(&self, wall: WallPoint) -> Vec<ShapeStep> {
+        let mut sum = vec![ShapeStep::zeros(); self.blocks()];
+        for function in self.functions_at(wall) {
+            sum[function.block][function.component] = function.value;
+        }
+        for (scale, range) in self.scales.iter().zip(self.ranges()) {
+            scale.functions.retain_deformation(&mut sum[range]);
+        }
+        sum
     }
 
     /// The displacement with the given coefficients, metres; None if there are no functions.

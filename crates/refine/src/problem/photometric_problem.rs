@@ -10,6 +10,7 @@ use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use crate::parameters::shape::Shape;
 use crate::parameters::unknowns::Unknowns;
 use crate::points::equations::PointEquations;
+use crate::problem::assumed_texture::AssumedTexture;
 use crate::problem::set_up::{min_density, normal_pattern, pixel_size_on_wall, pose_frames};
 use crate::problem::unknown_texture::UnknownTexture;
 use crate::samples::excluded_tiles::ExcludedTiles;
@@ -82,6 +83,8 @@ pub struct PhotometricProblem<'a> {
     pub(super) wall_model: Option<WallModel>,
     /// Information of the slopes, if the texture is known by its spectrum only.
     pub(super) unknown_texture: Option<UnknownTexture>,
+    /// The texture that takes the place of the frames' pixels.
+    pub(super) assumed_texture: Option<AssumedTexture>,
     /// True if the shared parameters are estimated.
     pub(super) estimates_shared: bool,
     /// The wall's shape, if it is estimated.
@@ -181,6 +184,7 @@ impl<'a> PhotometricProblem<'a> {
             denoiser: None,
             wall_model: None,
             unknown_texture: None,
+            assumed_texture: None,
             estimates_shared: false,
             shape,
             points,
@@ -212,6 +216,14 @@ impl<'a> PhotometricProblem<'a> {
         Self {
             unknown_texture: Some(texture.clone()),
             ..self
+        }
+    }
+
+    /// Assumes a texture of the wall in place of what the pixels show.
+    pub fn with_assumed_texture(self, texture: AssumedTexture) -> Self {
+        Self {
+            assumed_texture: Some(texture),
+            ..self.with_known_noise(texture.noise_grey)
         }
     }
 

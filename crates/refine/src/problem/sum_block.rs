@@ -119,6 +119,15 @@ impl PhotometricProblem<'_> {
                 })
                 .collect();
         }
+        if let Some(texture) = &self.assumed_texture {
+            return tiles
+                .iter()
+                .map(|tile| {
+                    let moments = texture.moments(visibility.observers(tile));
+                    self.tile_sums(context, tile, &points_of(tile), &moments, sums)
+                })
+                .collect();
+        }
         let spacing_m = (self.grid.spacing_s_m, self.grid.spacing_h_m);
         let weighting = ResidualWeighting {
             noise: &self.noise,
