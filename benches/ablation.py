@@ -53,6 +53,8 @@ EDITS = [
      "for level in (0..=handover).rev().filter(|l| *l == 0 || *l == handover) {"),
     ("solves after the first and before the last", "stages/plan.rs", "for level in (0..=handover).rev() {",
      "for level in [handover] {"),
+    ("solves at coarser levels", "stages/plan.rs", "for level in (0..=handover).rev() {\n        let plan = SolvePlan::intermediate(options, level, handover);",
+     "for level in [0] {\n        let plan = SolvePlan::intermediate(options, level, handover); let handover = 0;"),
     ("outlier mask", "samples/outlier_mask.rs", "self.tiles.extend(outliers.concat());", "let _ = outliers;"),
     ("denoised slopes", "tiles/denoising.rs",
      "(1.0 - noise[l][k] / self.squares[l][k].max(f64::MIN_POSITIVE)).max(0.0) as f32",
