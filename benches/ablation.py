@@ -47,14 +47,6 @@ EDITS = [
     ("alias test", "validation/alias_search.rs",
      ") -> Result<Vec<GaugeMotion>, ProblemError> {\n    let side",
      ") -> Result<Vec<GaugeMotion>, ProblemError> {\n    if true { return Ok(Vec::new()); }\n    let side"),
-    ("solve where tracking ended", "stages/plan.rs", "stages.push_back(Stage::Solve(plan));",
-     "if level < handover || handover == 0 { stages.push_back(Stage::Solve(plan)); }"),
-    ("levels between", "stages/plan.rs", "for level in (0..=handover).rev() {",
-     "for level in (0..=handover).rev().filter(|l| *l == 0 || *l == handover) {"),
-    ("solves after the first and before the last", "stages/plan.rs", "for level in (0..=handover).rev() {",
-     "for level in [handover] {"),
-    ("solves at coarser levels", "stages/plan.rs", "for level in (0..=handover).rev() {\n        let plan = SolvePlan::intermediate(options, level, handover);",
-     "for level in [0] {\n        let plan = SolvePlan::intermediate(options, level, handover); let handover = 0;"),
     ("outlier mask", "samples/outlier_mask.rs", "self.tiles.extend(outliers.concat());", "let _ = outliers;"),
     ("denoised slopes", "tiles/denoising.rs",
      "(1.0 - noise[l][k] / self.squares[l][k].max(f64::MIN_POSITIVE)).max(0.0) as f32",
@@ -62,7 +54,6 @@ EDITS = [
     ("variance by the gradient", "stages/plan.rs", "variance_weighting: true,", ""),
     ("curvature factor of σ", "solver/solve_record.rs",
      "let steps = self", "if true { return 1.0; }\n        let steps = self"),
-    ("tile selection", "options.rs", "intermediate_information: 0.5,", "intermediate_information: 1.0,"),
     ("two samples per pixel", "options.rs", "final_density: 2.0,", "final_density: 1.0,"),
 ]
 

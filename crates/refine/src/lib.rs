@@ -27,7 +27,7 @@
 //!
 //! | step | where |
 //! | --- | --- |
-//! | samples: tiles of the wall, the frames that see them, the most informative ones, no outliers | [`samples`] |
+//! | samples: tiles of the wall, the frames that see them, no outliers | [`samples`] |
 //! | linearise: texture, residuals, Jacobian and their moments over a tile | [`tiles`] |
 //! | reduce: sums over tiles to cost and normal equations | [`problem`] |
 //! | solve: sparse Cholesky, shared parameters by Schur complement | [`linear`] |
@@ -45,9 +45,8 @@
 //! - The work on a tile is loops over whole vectors ([`tiles::tile`]), compiled for several
 //!   processors; the version for the present one is chosen at run time. Sums keep their order, so
 //!   results stay the same.
-//! - The last solve samples the wall twice a pixel along each axis; those before it use the tiles
-//!   with most information ([`samples::tile_selection`]). `--fast` samples 1.5 times a pixel and
-//!   takes a single step, if that is short.
+//! - The last solve samples the wall twice a pixel along each axis; the first once.
+//!   `--fast` samples 1.5 times a pixel and takes a single step, if that is short.
 //! - Each linearisation serves twice: its cost judges the step that led there, its equations make
 //!   the next. The last step of a solve is within its tolerance and is not judged.
 //! - The corners of tiles are computed once for all frames ([`samples::visibility`]), local

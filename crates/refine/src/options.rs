@@ -54,9 +54,6 @@ pub struct RefineOptions {
     /// Wall samples per pixel along each axis at which the outlier mask of the last solve is found;
     /// if None, those of that solve. (A joint solve always uses two a pixel.)
     pub outlier_mask_density: Option<f64>,
-    /// Share of the information that the global solves before the last use, below the level where
-    /// tracking ends: they compare the most informative tiles, 0 to 1.
-    pub intermediate_information: f64,
     /// Solve once more, for the wall at a third of a pixel jointly with the poses, instead of
     /// interpolating between the frames' pixels: on walls with sharp edges errors are about a third
     /// smaller, in ten to twenty times the time. The solve is skipped where the wall is too smooth
@@ -91,7 +88,6 @@ impl Default for RefineOptions {
             window_stride: 6,
             final_density: 2.0,
             outlier_mask_density: None,
-            intermediate_information: 0.5,
             joint: false,
             max_sigma_px: 0.25,
             false_alarm_rate: 1e-3,

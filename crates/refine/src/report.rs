@@ -89,12 +89,8 @@ pub struct FrameReport {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct LevelReport {
-    /// Pyramid level; 0 is full size.
-    pub level: usize,
     /// Wall samples per pixel along each axis.
     pub samples_per_pixel: f64,
-    /// Share of the wall that was compared, the most informative.
-    pub share_of_wall: f64,
     /// True if the wall was solved for jointly with the poses.
     #[serde(default)]
     pub joint: bool,

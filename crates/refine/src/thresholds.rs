@@ -207,13 +207,16 @@ pub mod footprints {
     pub const MAX_OVERLAP_DISTANCE_FRAMES: usize = 256;
 }
 
-/// Thresholds of `samples/tile_projection.rs` and `tracking/reference_mosaic.rs`.
+/// Thresholds of `samples/tile_projection.rs` and `samples/visibility.rs`.
 pub mod visibility {
-    /// Least area of a sample in a frame over that at the distance the lattice was laid out for: of
-    /// the tiles that are compared, and of the points of the reference mosaic.
+    /// Least area of a tile's sample in a frame over that at the distance the lattice was laid out
+    /// for, and over that in the frame that sees the tile best. What a frame resolves less is
+    /// blurred against the others, so that their differences are no noise, and a pixel is spread
+    /// over many samples.
     ///
-    /// Higher: more oblique or distant wall is excluded. Chosen by: unknown.
-    pub const MIN_RELATIVE_SAMPLE_AREA: f64 = 0.05;
+    /// Higher: more oblique or distant wall is excluded. Chosen by: cameras that look along the
+    /// tunnel, whose time and residuals fall as it rises from 0.05.
+    pub const MIN_RELATIVE_SAMPLE_AREA: f64 = 0.2;
 }
 
 /// Thresholds of `samples/outlier_mask.rs`.

@@ -41,12 +41,12 @@ fn print_work(report: &RefineReport, terminal: &Terminal) {
 
 /// Prints the table of global solves, and why the last one stopped.
 fn print_solves(report: &RefineReport, terminal: &Terminal) {
-    terminal.say("  level  steps        cost: start → end      observations  noise (grey)");
+    terminal.say("  samples/px  steps        cost: start → end      observations  noise (grey)");
     for level in &report.levels {
         let solve = &level.solve;
         terminal.say(format!(
-            "  {:>5}  {:>5}  {:>12.4e} → {:>11.4e}  {:>12}  {:>12.2}{}",
-            level.level,
+            "  {:>10}  {:>5}  {:>12.4e} → {:>11.4e}  {:>12}  {:>12.2}{}",
+            level.samples_per_pixel,
             solve.iterations,
             solve.cost_start,
             solve.cost_end,

@@ -3,7 +3,7 @@
 use super::page_data::PageData;
 use crate::refine::{LevelReport, StopReason};
 use crate::report::chart::{Axis, Chart, CurveStyle, Series, Vertical, legend};
-use crate::report::quantity::{count, short, significant};
+use crate::report::quantity::{count, short};
 use maud::{Markup, html};
 
 /// Draws the section; `None` without refine's report.
@@ -34,18 +34,9 @@ pub fn section(data: &PageData) -> Option<Markup> {
     })
 }
 
-/// Name of a solve: pyramid level, density of samples, share of the wall.
+/// Name of a solve: density of samples, and whether the wall is solved for.
 fn name(level: &LevelReport) -> String {
-    let mut name = format!("level {}", level.level);
-    if level.samples_per_pixel != 1.0 {
-        name += &format!(", {} samples per px", level.samples_per_pixel);
-    }
-    if level.share_of_wall < 0.995 {
-        name += &format!(
-            ", {} % of the wall",
-            significant(100.0 * level.share_of_wall, 2)
-        );
-    }
+    let mut name = format!("{} samples per px", level.samples_per_pixel);
     if level.joint {
         name += ", jointly with the wall";
     }

@@ -120,7 +120,7 @@ impl PhotometricProblem<'_> {
         let readout_s = self.context.calibration.readout_s(&unknowns.kappa);
         let surface = self.surface_at(unknowns);
         for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch)?;
+            let visibility = self.coverage.visibility(stretch);
             let pyramids = self.images.load(self.coverage.frames(stretch))?;
             let at_level = camera.at_level(self.sampling.level);
             let sampled_frames = self.sampled_frames(

@@ -122,7 +122,7 @@ impl PhotometricProblem<'_> {
         let stride = (blocks / WALL_MODEL_BLOCKS).max(1);
         let mut results = Vec::new();
         for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch)?;
+            let visibility = self.coverage.visibility(stretch);
             let pyramids = self.images.load(self.coverage.frames(stretch))?;
             let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
             let blocks: Vec<&Range<usize>> = visibility.blocks.iter().step_by(stride).collect();
@@ -162,7 +162,6 @@ impl PhotometricProblem<'_> {
             Some(density) => {
                 let sampling = Sampling {
                     density,
-                    information: 1.0,
                     joint: false,
                     ..self.sampling
                 };
@@ -175,7 +174,7 @@ impl PhotometricProblem<'_> {
                 let other = Self::new(&self.context, sampling, window)?;
                 let mut mask = other.empty_outlier_mask()?;
                 for stretch in 0..other.coverage.len() {
-                    let visibility = other.coverage.visibility(stretch)?;
+                    let visibility = other.coverage.visibility(stretch);
                     other.detect_outliers(stretch, &visibility, &mut mask)?;
                 }
                 mask
@@ -184,7 +183,7 @@ impl PhotometricProblem<'_> {
         let mut excluded = Vec::new();
         let mut excluded_tiles = ExcludedTiles::default();
         for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch)?;
+            let visibility = self.coverage.visibility(stretch);
             if density.is_none() {
                 mask.clear();
                 self.detect_outliers(stretch, &visibility, &mut mask)?;
@@ -250,7 +249,7 @@ impl PhotometricProblem<'_> {
         let stride = (self.coverage.tiles / count).max(1);
         let mut gathered = Vec::new();
         for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch)?;
+            let visibility = self.coverage.visibility(stretch);
             let participants = self.coverage.frames(stretch);
             let pyramids = self.images.load(participants)?;
             let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);

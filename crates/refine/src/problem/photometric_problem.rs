@@ -104,12 +104,7 @@ impl<'a> PhotometricProblem<'a> {
         sampling: Sampling,
         window: FrameWindow,
     ) -> Result<Self, ProblemError> {
-        let Sampling {
-            level,
-            density,
-            information,
-            ..
-        } = sampling;
+        let Sampling { level, density, .. } = sampling;
         let camera = context.camera.at_level(level);
         let rate = |frame| context.sweep_rate(frame, &window.participants, window.estimates);
         let rates: Vec<Sweep> = window.participants.clone().map(rate).collect();
@@ -131,7 +126,6 @@ impl<'a> PhotometricProblem<'a> {
         let images = FrameImages {
             frames: context.frames,
             first: participants.start,
-            level,
         };
         let exclusions = Exclusions {
             ignored: context.ignored,
@@ -143,16 +137,15 @@ impl<'a> PhotometricProblem<'a> {
             camera,
             images,
             exclusions,
-            information,
             posed,
-        )?;
+        );
         let shape = context.shape.clone().filter(|_| sampling.shape);
         let frames = (participants.start, &active);
         let points = shape.as_deref().zip(context.points.as_ref());
         let points = points
             .map(|(shape, points)| Arc::new(PointEquations::new(Arc::clone(points), &shape.model)));
         let of_shape = shape.as_deref().map(|shape| (shape, points.as_deref()));
-        let pattern = normal_pattern(context, &coverage, &grid, frames, of_shape)?;
+        let pattern = normal_pattern(context, &coverage, &grid, frames, of_shape);
         let symbolic =
             SymbolicFactorisation::new(&pattern).map_err(|source| ProblemError::Factor {
                 first: active.start,
@@ -318,11 +311,6 @@ impl<'a> PhotometricProblem<'a> {
         self.wall_model.is_some()
     }
 
-    /// Share of the tiles that are selected, 0 to 1.
-    pub fn compared_share(&self) -> f64 {
-        self.coverage.tiles as f64 / self.coverage.all_tiles.max(1) as f64
-    }
-
     /// The wall where the outlier mask has excluded frames, of the problem's lattice.
     pub fn masked_wall(&self) -> MaskedWall {
         let perimeter_m = self.context.surface.perimeter_m();
@@ -434,29 +422,5 @@ impl<'a> PhotometricProblem<'a> {
             0 => self.context.gauge().degrees_of_freedom(),
             _ => 0,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::problem::test_ring::Ring;
-
-    /// Half of the information is in less than half of the wall.
-    #[test]
-    fn half_of_the_information_is_in_less_than_half_of_the_tiles() {
-        let ring = Ring::new(1e-4);
-        let (all, half) = (ring.problem(), ring.problem_with(0.5));
-        assert!((0.2..0.5).contains(&half.compared_share()));
-        let trace = |problem: &PhotometricProblem| -> f64 {
-            let at = problem.linearise(&ring.estimates).unwrap();
-            let poses = at.normal.blocks.iter();
-            problem.sigma().powi(2)
-                * poses
-                    .map(|b| b.fixed_view::<6, 6>(0, 0).trace())
-                    .sum::<f64>()
-        };
-        let share = trace(&half) / trace(&all);
-        assert!((0.4..0.65).contains(&share), "{share}");
     }
 }

@@ -11,7 +11,6 @@ use crate::samples::visibility::PosedFrame;
 use crate::tiles::grid::{SIDE, WallGrid};
 use std::collections::HashSet;
 use std::ops::Range;
-use tunnelstitch_core::frames::FrameError;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{Surface, mean_radius_m, viewing_distance};
@@ -53,16 +52,13 @@ pub fn pose_frames(
 /// and of the blocks of the shape behind them: frames that observe common tiles or have a common
 /// prior, blocks with functions in a common block of the wall or at a common measured point, and
 /// those with the frames that observe it.
-///
-/// # Errors
-/// [`FrameError`] if an image that the selection of tiles needs cannot be read.
 pub fn normal_pattern(
     context: &EstimationContext,
     coverage: &TileCoverage,
     grid: &WallGrid,
     (first, active): (usize, &Range<usize>),
     shape: Option<(&Shape, Option<&PointEquations>)>,
-) -> Result<Pattern, FrameError> {
+) -> Pattern {
     let slot = |k: usize| {
         let frame = first + k;
         active.contains(&frame).then(|| frame - active.start)
@@ -72,12 +68,12 @@ pub fn normal_pattern(
     let mut pairs: HashSet<(usize, usize)> = covisible.collect();
     pairs.extend(context.prior.pairs(active));
     let Some((Shape { model, .. }, points)) = shape else {
-        return Ok(Pattern::new(active.len(), pairs));
+        return Pattern::new(active.len(), pairs);
     };
     let of_points = points.into_iter().flat_map(PointEquations::pairs);
     pairs.extend(of_points.map(|(a, b)| (active.len() + a, active.len() + b)));
     for stretch in 0..coverage.len() {
-        let visibility = coverage.visibility(stretch)?;
+        let visibility = coverage.visibility(stretch);
         for tiles in &visibility.blocks {
             let tiles_of_block = visibility.tiles[tiles.clone()].iter();
             let functions =
@@ -91,7 +87,7 @@ pub fn normal_pattern(
             }
         }
     }
-    Ok(Pattern::new(active.len() + model.blocks(), pairs))
+    Pattern::new(active.len() + model.blocks(), pairs)
 }
 
 /// Slots of the blocks that some functions of the shape belong to, ascending; they follow the slots

@@ -67,7 +67,7 @@ impl Ring {
 
     /// The problem of all frames at full size.
     pub fn problem(&self) -> PhotometricProblem<'_> {
-        self.problem_with(1.0)
+        self.problem_of(self.sampling())
     }
 
     /// Two samples per pixel.
@@ -86,14 +86,6 @@ impl Ring {
             joint: true,
             ..self.sampling()
         }
-    }
-
-    /// The problem with a share of the information.
-    pub fn problem_with(&self, information: f64) -> PhotometricProblem<'_> {
-        self.problem_of(Sampling {
-            information,
-            ..self.sampling()
-        })
     }
 
     /// The problem with this sampling.

@@ -11,9 +11,8 @@ use tunnelstitch_geometry::trajectory::Pose;
 /// Distance up to which a camera on the axis resolves the wall, radii of a circle with the
 /// section's perimeter.
 ///
-/// At an angle φ to the section `cos³ φ` of the pixels are left: the share
-/// [`crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA`] at `tan φ = √(0.05^(−2/3) − 1)` =
-/// 2.5, where the wall is `1/cos φ` away.
+/// At an angle φ to the section the wall is `1/cos φ` away, and `cos³ φ` of the pixels are left:
+/// here a twentieth.
 pub const RESOLVED_RANGE_RADII: f64 = 2.7;
 
 /// Footprint of frame `frame` at `pose`, taken by `camera`.

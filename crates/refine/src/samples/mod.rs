@@ -3,7 +3,6 @@
 //! ```text
 //! poses ─> footprints ─> tile_candidates ─> tile_projection ─> Visibility (tile, observers)
 //!                                                                  │
-//! images ──> tile_selection (most informative tiles) ──────────────┤
 //! images ──> OutlierMask (observers that do not show the wall) ────┤
 //!                                                                  ▼
 //!                                          TileCoverage, stretch by stretch
@@ -24,5 +23,4 @@ pub mod sampling;
 pub mod tile_candidates;
 pub mod tile_coverage;
 pub mod tile_projection;
-pub mod tile_selection;
 pub mod visibility;

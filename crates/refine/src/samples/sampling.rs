@@ -1,18 +1,15 @@
-//! Resolution and share of the wall samples that a problem uses.
+//! Resolution of the wall samples that a problem uses.
 
 use crate::tiles::interpolation::Interpolation;
 use serde::{Deserialize, Serialize};
 
-/// Resolution, share and weighting of the wall samples of a problem.
+/// Resolution and weighting of the wall samples of a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sampling {
     /// Pyramid level of the frames; 0 is full size.
     pub level: usize,
     /// Wall samples per pixel along each axis.
     pub density: f64,
-    /// Share of the information that is used, 0 to 1: the most informative tiles are selected until
-    /// they hold it ([`crate::samples::tile_selection`]).
-    pub information: f64,
     /// Interpolation between a frame's pixels.
     pub interpolation: Interpolation,
     /// True if samples are weighted by their variance, which lowers the weight of steep ones
@@ -35,7 +32,6 @@ impl Sampling {
         Self {
             level,
             density: 1.0,
-            information: 1.0,
             interpolation: Interpolation::Bilinear,
             variance_weighting: false,
             joint: false,

@@ -3,12 +3,9 @@
 //! The wall is processed stretch by stretch, so that memory for samples and frames does not grow
 //! with the tunnel's length.
 
-use crate::parameters::frame_estimate::FrameEstimate;
 use crate::samples::observer_marks::ObserverMarks;
 use crate::samples::tile_candidates::covered_rows;
-use crate::samples::tile_selection::select_most_informative;
 use crate::samples::visibility::{Exclusions, PosedFrame, Visibility};
-use crate::tiles::frame_samples::SampledFrame;
 use crate::tiles::grid::{BLOCK, WallGrid};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -43,8 +40,6 @@ pub struct FrameImages<'a> {
     pub frames: &'a FrameCache,
     /// Index of the first participant among all frames.
     pub first: usize,
-    /// Pyramid level.
-    pub level: usize,
 }
 
 impl FrameImages<'_> {
@@ -64,8 +59,6 @@ pub struct TileCoverage<'a> {
     camera: Camera,
     images: FrameImages<'a>,
     exclusions: Exclusions<'a>,
-    /// Share of the information that the selected tiles hold, 0 to 1.
-    information: f64,
     /// Poses of the participants at which the tiles are selected; None for those that are not
     /// compared.
     posed: Vec<Option<PosedFrame>>,
@@ -74,30 +67,23 @@ pub struct TileCoverage<'a> {
     kept: Vec<Option<Visibility>>,
     /// Excluded observers, stretch by stretch; empty if there are none.
     excluded: Vec<ObserverMarks>,
-    /// Number of selected tiles.
+    /// Number of tiles.
     pub tiles: usize,
-    /// Number of all tiles.
-    pub all_tiles: usize,
     /// Pairs of participants that observe common tiles, in ascending order, each once, a frame with
     /// itself included.
     pub pairs: Vec<(usize, usize)>,
 }
 
 impl<'a> TileCoverage<'a> {
-    /// Finds the tiles of all participants and selects those that hold the share `information` of
-    /// the information.
-    ///
-    /// # Errors
-    /// [`FrameError`] if an image that the selection needs cannot be read.
+    /// Finds the tiles of all participants.
     pub fn new(
         surface: Arc<dyn Surface>,
         grid: WallGrid,
         camera: Camera,
         images: FrameImages<'a>,
         exclusions: Exclusions<'a>,
-        information: f64,
         posed: Vec<Option<PosedFrame>>,
-    ) -> Result<Self, FrameError> {
+    ) -> Self {
         let mut coverage = Self {
             stretches: divide_into_stretches(&grid, &posed, images.frames.pyramid_capacity()),
             surface,
@@ -105,18 +91,15 @@ impl<'a> TileCoverage<'a> {
             camera,
             images,
             exclusions,
-            information,
             posed,
             kept: Vec::new(),
             excluded: Vec::new(),
             tiles: 0,
-            all_tiles: 0,
             pairs: Vec::new(),
         };
         let mut observations = 0;
         for stretch in 0..coverage.stretches.len() {
-            let (visibility, all_tiles) = coverage.find(stretch)?;
-            coverage.all_tiles += all_tiles;
+            let visibility = coverage.find(stretch);
             coverage.tiles += visibility.tiles.len();
             let pairs = coverage.pairs_of(stretch, &visibility);
             coverage.pairs.extend(pairs);
@@ -126,7 +109,7 @@ impl<'a> TileCoverage<'a> {
         }
         coverage.pairs.sort_unstable();
         coverage.pairs.dedup();
-        Ok(coverage)
+        coverage
     }
 
     /// True for the participants that are compared.
@@ -146,20 +129,17 @@ impl<'a> TileCoverage<'a> {
     }
 
     /// The observations of a stretch: those kept in memory, or computed anew from the same poses.
-    ///
-    /// # Errors
-    /// [`FrameError`].
-    pub fn visibility(&self, stretch: usize) -> Result<Cow<'_, Visibility>, FrameError> {
-        Ok(match &self.kept[stretch] {
+    pub fn visibility(&self, stretch: usize) -> Cow<'_, Visibility> {
+        match &self.kept[stretch] {
             Some(visibility) => Cow::Borrowed(visibility),
             None => {
-                let all = self.find(stretch)?.0;
+                let all = self.find(stretch);
                 Cow::Owned(match self.excluded.get(stretch) {
                     Some(marks) => all.exclude(marks),
                     None => all,
                 })
             }
-        })
+        }
     }
 
     /// Excludes the marked observers, stretch by stretch.
@@ -172,11 +152,11 @@ impl<'a> TileCoverage<'a> {
         self.excluded = marks;
     }
 
-    /// Computes the observations of a stretch; also returns the number of tiles before selection.
-    fn find(&self, stretch: usize) -> Result<(Visibility, usize), FrameError> {
+    /// Computes the observations of a stretch.
+    fn find(&self, stretch: usize) -> Visibility {
         let Stretch { rows, frames } = &self.stretches[stretch];
         let posed: Vec<PosedFrame> = frames.iter().filter_map(|k| self.posed[*k]).collect();
-        let all = Visibility::find(
+        Visibility::find(
             self.surface.as_ref(),
             &self.grid,
             &self.camera,
@@ -184,29 +164,7 @@ impl<'a> TileCoverage<'a> {
             &self.exclusions,
             &posed,
             rows,
-        );
-        if self.information >= 1.0 {
-            let count = all.tiles.len();
-            return Ok((all, count));
-        }
-        let pyramids = self.images.load(frames)?;
-        let sampled_frames: Vec<SampledFrame> = pyramids
-            .iter()
-            .zip(&posed)
-            .map(|(pyramid, posed)| {
-                let image = pyramid.level(self.images.level);
-                let camera = self.camera.with_sweep(&posed.sweep);
-                SampledFrame::new(image, camera, &FrameEstimate::at(posed.pose))
-            })
-            .collect();
-        let selected = select_most_informative(
-            &all,
-            self.information,
-            &self.grid,
-            self.surface.as_ref(),
-            &sampled_frames,
-        );
-        Ok((selected, all.tiles.len()))
+        )
     }
 
     /// Pairs of participants that observe common blocks of a stretch.

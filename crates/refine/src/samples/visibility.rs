@@ -4,6 +4,7 @@ use crate::samples::observer::Observer;
 use crate::samples::observer_marks::ObserverMarks;
 use crate::samples::tile_candidates::{TileNumbering, TileRange};
 use crate::samples::tile_projection::project_tile;
+use crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA;
 use crate::tiles::grid::{TileId, WallGrid};
 use std::collections::HashSet;
 use std::ops::Range;
@@ -56,7 +57,7 @@ impl Exclusions<'_> {
 /// The observations of a set of frames: every tile with at least two observers, one of them active.
 ///
 /// A frame either observes a whole tile, with the ring that its gradients need, or not at all. So
-/// every sample of a tile averages the same frames. The set stays constant while the poses move, so
+/// every sample of a tile averages the same frames, which see it about equally sharp. The set stays constant while the poses move, so
 /// that costs before and after a step are of the same samples.
 #[derive(Clone, Debug, Default)]
 pub struct Visibility {
@@ -125,10 +126,14 @@ impl Visibility {
         let mut visibility = Self::default();
         for tile in 0..numbering.count() {
             let group = &sorted[starts[tile]..starts[tile + 1]];
-            if group.len() < 2 || !group.iter().any(|o| posed[o.frame as usize].active) {
+            let sharpest = group.iter().fold(0.0f32, |most, o| most.max(o.pixels));
+            let least = MIN_RELATIVE_SAMPLE_AREA as f32 * sharpest;
+            let sharp = group.iter().copied().filter(|o| o.pixels >= least);
+            let mut active = sharp.clone().map(|o| posed[o.frame as usize].active);
+            if sharp.clone().nth(1).is_none() || !active.any(|active| active) {
                 continue;
             }
-            visibility.push(numbering.id(tile), group.iter().copied());
+            visibility.push(numbering.id(tile), sharp);
         }
         visibility.find_blocks();
         visibility

@@ -162,8 +162,7 @@ fn judge(
     rejections: &mut [Option<RejectionReason>],
 ) {
     let camera = &setup.input.camera;
-    let all_pixels =
-        f64::from(camera.width) * f64::from(camera.height) * solution.problem.compared_share();
+    let all_pixels = f64::from(camera.width) * f64::from(camera.height);
     for (k, rejection) in rejections.iter_mut().enumerate() {
         let evidence = FrameEvidence {
             rejection: rejection.take(),

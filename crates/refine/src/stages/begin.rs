@@ -15,7 +15,7 @@ pub fn begin(setup: &Setup) -> PipelineState {
         kappa: Kappa::zeros(),
     };
     PipelineState {
-        stages: plan_stages(setup.options, setup.handover_level()),
+        stages: plan_stages(setup.options),
         over: Vec::new(),
         noise: 0.0,
         has_common_light: true,

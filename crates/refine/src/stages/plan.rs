@@ -31,19 +31,18 @@ pub enum Stage {
     Assess,
 }
 
-/// The stages of a refinement whose tracking ends at pyramid level `handover`: track coarsely,
-/// solve coarse to fine with a check after the first solve and a repair before the last, assess.
-pub fn plan_stages(options: &RefineOptions, handover: usize) -> VecDeque<Stage> {
-    let mut stages = VecDeque::from([Stage::Prescreen, Stage::Track, Stage::CorrectShading]);
-    for level in (0..=handover).rev() {
-        let plan = SolvePlan::intermediate(options, level, handover);
-        stages.push_back(Stage::Solve(plan));
-        if level == handover {
-            stages.push_back(Stage::ValidatePairs);
-        }
-    }
-    stages.push_back(Stage::Repair);
-    stages.push_back(Stage::Solve(SolvePlan::last(options)));
+/// The stages of a refinement: track coarsely, solve at full size, check, repair, solve with denser
+/// samples, assess.
+pub fn plan_stages(options: &RefineOptions) -> VecDeque<Stage> {
+    let mut stages = VecDeque::from([
+        Stage::Prescreen,
+        Stage::Track,
+        Stage::CorrectShading,
+        Stage::Solve(SolvePlan::first(options)),
+        Stage::ValidatePairs,
+        Stage::Repair,
+        Stage::Solve(SolvePlan::last(options)),
+    ]);
     if options.joint {
         stages.push_back(Stage::Solve(SolvePlan::joint(options)));
     }
@@ -61,21 +60,14 @@ pub struct SolvePlan {
 }
 
 impl SolvePlan {
-    /// A solve that only brings the estimate close for the next one, finer level; the first, at the
-    /// level where tracking ended, uses all of the information.
-    pub fn intermediate(options: &RefineOptions, level: usize, handover_level: usize) -> Self {
-        let information = if level == handover_level {
-            1.0
-        } else {
-            options.intermediate_information
-        };
+    /// The first solve, which only brings the estimate close for the last one.
+    pub fn first(options: &RefineOptions) -> Self {
         Self {
             sampling: Sampling {
-                information,
                 shape: true,
-                ..Sampling::of(level)
+                ..Sampling::of(0)
             },
-            stopping: Stopping::intermediate(options, level),
+            stopping: Stopping::intermediate(options, 0),
         }
     }
 
@@ -120,20 +112,12 @@ impl SolvePlan {
 
     /// The solve in words, for the progress display and the timings.
     pub fn name(&self) -> String {
-        let Sampling {
-            level,
-            density,
-            information,
-            ..
-        } = self.sampling;
-        let mut name = format!("level {level}");
-        if density != 1.0 {
-            name += &format!(", {density} samples per pixel");
+        let Sampling { density, joint, .. } = self.sampling;
+        match (joint, density) {
+            (true, _) => "solve, jointly with the wall".to_owned(),
+            (false, 1.0) => "solve, a sample per pixel".to_owned(),
+            (false, density) => format!("solve, {density} samples per pixel"),
         }
-        if information != 1.0 {
-            name += &format!(", {:.0} % of the information", 100.0 * information);
-        }
-        name
     }
 }
 
@@ -142,24 +126,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn solves_go_from_coarse_to_fine_and_end_at_full_size() {
+    fn poses_are_checked_after_the_first_solve_and_solved_densely_at_last() {
         let options = RefineOptions {
             joint: true,
             ..RefineOptions::default()
         };
-        let stages = plan_stages(&options, 2);
+        let stages = plan_stages(&options);
         let solves = stages.iter().filter_map(|stage| match stage {
-            Stage::Solve(plan) => Some((plan.sampling.level, plan.sampling.joint)),
+            Stage::Solve(plan) => Some((plan.sampling.density, plan.sampling.joint)),
             _ => None,
         });
-        let expected = [(2, false), (1, false), (0, false), (0, false), (0, true)];
-        assert_eq!(solves.collect::<Vec<_>>(), expected);
-        assert_eq!(stages.back(), Some(&Stage::Assess));
-        // The first solve is checked at once, with all of the information.
+        let solves: Vec<(f64, bool)> = solves.collect();
+        let joint = joint::SAMPLES_PER_PIXEL;
+        assert_eq!(solves, [(1.0, false), (2.0, false), (joint, true)]);
         assert_eq!(stages[4], Stage::ValidatePairs);
-        let Stage::Solve(first) = stages[3] else {
-            panic!("{:?}", stages[3]);
-        };
-        assert_eq!(first.sampling.information, 1.0);
+        assert_eq!(stages.back(), Some(&Stage::Assess));
     }
 }

@@ -1,4 +1,4 @@
-//! Stage: solves all frames together at one pyramid level.
+//! Stage: solves all frames together at full size.
 
 use crate::error::RefineError;
 use crate::model::context::EstimationContext;
@@ -18,7 +18,7 @@ use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::validation::inconsistent_frames::reject_disagreeing_frames;
 
-/// Solves at full size after which the strengths of the shape are not learned again.
+/// Solves after which the strengths of the shape are not learned again.
 const MAX_LEARNING_SOLVES: usize = 4;
 
 /// Runs the stage; a snapshot may be kept between two steps.
@@ -36,9 +36,7 @@ pub fn run<'a>(
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
     let state = &mut estimation.state;
-    if plan.sampling.level == 0 {
-        shape::begin(setup, state)?;
-    }
+    shape::begin(setup, state)?;
     let context = setup.context(state);
     let Some(problem) = problem_of(&plan, setup, &context, state)? else {
         session.record_time("joint model of the wall");
@@ -53,12 +51,12 @@ pub fn run<'a>(
     state.kappa = solution.unknowns.kappa;
     shape::take_over(setup, state, &solution);
     let is_last = !has_solve_ahead(state);
-    if may_learn_shape(&plan, state) && shape::learn(setup, state, &solution, is_last) && is_last {
+    if may_learn_shape(state) && shape::learn(setup, state, &solution, is_last) && is_last {
         plan_again(&plan, setup.options, state);
     }
     solution.remove_tested();
     solution.tie_gauge();
-    let uncertainty = uncertainty_of(&plan, setup, &context, state, &solution)?;
+    let uncertainty = uncertainty_of(setup, &context, state, &solution)?;
     let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
     let mut kappa = state.kappa;
     for parameter in &unobservable {
@@ -73,17 +71,13 @@ pub fn run<'a>(
     }
     state.unobservable.extend(unobservable);
     state.solved.clone_from(&state.frames);
-    if plan.sampling.level == 0 {
-        reject_disagreeing_frames(&solution.linearisation.frames, &mut state.frames.rejections);
-    }
+    reject_disagreeing_frames(&solution.linearisation.frames, &mut state.frames.rejections);
     state.levels.push(GlobalSolve {
-        level: plan.sampling.level,
         samples_per_pixel: plan.sampling.density,
-        share_of_wall: solution.problem.compared_share(),
         joint: solution.problem.is_joint(),
         record: solution.record.clone(),
     });
-    if plan.sampling.level == 0 && state.frames.has_majority() {
+    if state.frames.has_majority() {
         let masked = solution.problem.masked_wall();
         estimation.hidden_bands =
             find_hidden_bands(&masked, context.nominal.as_ref(), &setup.hidden_bands);
@@ -107,7 +101,7 @@ pub fn run<'a>(
             });
         }
     }
-    session.record_time(&format!("global {}", plan.name()));
+    session.record_time(&plan.name());
     Ok(estimation)
 }
 
@@ -123,10 +117,6 @@ fn problem_of<'a>(
         PhotometricProblem::new(context, sampling, state.frames.window())?.with_shared_parameters();
     if sampling.joint && !problem.is_joint() {
         return Ok(None);
-    }
-    // Before the frames are aligned at full size, residuals are mostly misalignment.
-    if sampling.level > 0 {
-        return Ok(Some(problem));
     }
     let density = if sampling.joint {
         Some(RefineOptions::default().final_density)
@@ -169,14 +159,13 @@ fn solve<'a>(
 /// The uncertainty of the last solution; before, unknowns may be free that it turns out not to
 /// have.
 fn uncertainty_of(
-    plan: &SolvePlan,
     setup: &Setup,
     context: &EstimationContext,
     state: &PipelineState,
     solution: &Solution,
 ) -> Result<Option<SolutionUncertainty>, ProblemError> {
     let calibration = setup.calibration_at(state);
-    if plan.sampling.level > 0 || has_solve_ahead(state) {
+    if has_solve_ahead(state) {
         return Ok(None);
     }
     let solved = context.at(solution.unknowns.kappa);
@@ -205,10 +194,9 @@ fn find_unobservable(
     }
 }
 
-/// True if the strengths of the shape are learned after this solve: at full size, a few times.
-fn may_learn_shape(plan: &SolvePlan, state: &PipelineState) -> bool {
-    let before = state.levels.iter().filter(|solve| solve.level == 0).count();
-    plan.sampling.level == 0 && before < MAX_LEARNING_SOLVES
+/// True if the strengths of the shape are learned after this solve: after the first few.
+fn may_learn_shape(state: &PipelineState) -> bool {
+    state.levels.len() < MAX_LEARNING_SOLVES
 }
 
 /// True if another solve is certain to follow; a joint one may turn out to be needless.

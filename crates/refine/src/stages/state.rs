@@ -57,12 +57,8 @@ pub struct PipelineState {
 /// One global solve that is over.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GlobalSolve {
-    /// Pyramid level; 0 is full size.
-    pub level: usize,
     /// Wall samples per pixel along each axis.
     pub samples_per_pixel: f64,
-    /// Share of the wall that was compared.
-    pub share_of_wall: f64,
     /// True if the wall was solved for jointly with the poses.
     pub joint: bool,
     /// Its course.
@@ -72,9 +68,7 @@ pub struct GlobalSolve {
 impl From<GlobalSolve> for LevelReport {
     fn from(solve: GlobalSolve) -> Self {
         Self {
-            level: solve.level,
             samples_per_pixel: solve.samples_per_pixel,
-            share_of_wall: solve.share_of_wall,
             joint: solve.joint,
             solve: solve.record,
         }

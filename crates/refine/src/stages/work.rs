@@ -13,10 +13,8 @@ const PRESCREEN_S: f64 = 0.008;
 const TRACK_S: f64 = 0.05;
 /// Time of correcting the common shading.
 const CORRECT_SHADING_S: f64 = 0.0005;
-/// Time of a solve at a reduced size.
-const COARSE_SOLVE_S: f64 = 0.002;
-/// Time of a solve at full size that only brings the estimate close.
-const INTERMEDIATE_SOLVE_S: f64 = 0.07;
+/// Time of the first solve, which only brings the estimate close.
+const FIRST_SOLVE_S: f64 = 0.07;
 /// Time per pixel of the last solve.
 const LAST_SOLVE_PER_PIXEL_S: f64 = 0.6e-6;
 /// Time per pixel of the solve jointly with the wall.
@@ -34,10 +32,9 @@ fn work_s(stage: &Stage, pixels: f64) -> f64 {
         Stage::Prescreen => PRESCREEN_S,
         Stage::Track => TRACK_S,
         Stage::CorrectShading => CORRECT_SHADING_S,
-        Stage::Solve(plan) if plan.sampling.level > 0 => COARSE_SOLVE_S,
         Stage::Solve(plan) if plan.sampling.joint => JOINT_SOLVE_PER_PIXEL_S * pixels,
         Stage::Solve(plan) if plan.sampling.variance_weighting => LAST_SOLVE_PER_PIXEL_S * pixels,
-        Stage::Solve(_) => INTERMEDIATE_SOLVE_S,
+        Stage::Solve(_) => FIRST_SOLVE_S,
         Stage::ValidatePairs => VALIDATE_PAIRS_S,
         Stage::Repair => REPAIR_S,
         Stage::Assess => ASSESS_S,
@@ -66,7 +63,7 @@ mod tests {
 
     #[test]
     fn shares_of_all_stages_add_up_to_the_whole_job() {
-        let mut left = plan_stages(&RefineOptions::default(), 2);
+        let mut left = plan_stages(&RefineOptions::default());
         let (mut over, mut places, count) = (Vec::new(), Vec::new(), left.len());
         let mut done_share = 0.0;
         while !left.is_empty() {

@@ -2,10 +2,9 @@
 
 use crate::thresholds::tile::REWEIGHTING_ITERATIONS;
 use crate::tiles::denoising::TextureSpectrum;
-use crate::tiles::frame_samples::SampledFrame;
-use crate::tiles::grid::{SIDE, TilePoints, ZERO};
+use crate::tiles::grid::{SIDE, TilePoints};
 use crate::tiles::residual_weighting::{Loss, NoiseHistogram, NoiseModel};
-use crate::tiles::tile_arrays::{INTERIOR, SAMPLES, ZERO_ROWS, dot, squared_gradients, sum};
+use crate::tiles::tile_arrays::{INTERIOR, SAMPLES, ZERO_ROWS, squared_gradients, sum};
 use crate::tiles::workspace::{FrameValues, Misfit, TileObservation, TileWorkspace};
 
 // Everything here is inlined into its caller, which is compiled for the processor's widest vectors.
@@ -107,22 +106,4 @@ impl TileWorkspace {
             (f64::from(frame.pixels).sqrt(), own * own)
         })
     }
-}
-
-/// Sums of the squared central differences along s and h over a tile, of the values of one frame;
-/// NaN if it lacks a value.
-#[inline(always)]
-pub fn squared_slopes(points: &TilePoints, frame: &SampledFrame, shade: f32) -> [f64; 2] {
-    let mut values = ZERO;
-    frame.sample(points, shade, &mut values);
-    let (mut along_s, mut along_h) = (ZERO_ROWS, ZERO_ROWS);
-    for k in 0..ZERO_ROWS.len() {
-        let c = k + SIDE;
-        along_s[k] = INTERIOR[k] * (values[c + 1] - values[c - 1]);
-        along_h[k] = INTERIOR[k] * (values[c + SIDE] - values[c - SIDE]);
-    }
-    [
-        f64::from(dot(&along_s, &along_s)),
-        f64::from(dot(&along_h, &along_h)),
-    ]
 }

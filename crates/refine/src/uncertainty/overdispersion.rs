@@ -86,7 +86,6 @@ pub fn compute_overdispersions(
 ) -> Vec<Overdispersion> {
     let at = &solution.linearisation;
     let pattern = solution.problem.pattern();
-    let patch = PATCH as f64 * solution.problem.compared_share();
     let dispersion = solution.problem.dispersion();
     let of_frame = |(k, estimate): (usize, &FrameEstimate)| {
         let place = pattern.block_index(k, k)?;
@@ -94,7 +93,7 @@ pub fn compute_overdispersions(
         let information = at.normal.blocks[place] * dispersion;
         let scatter = at.scatter[place] * dispersion.powi(2);
         let blocks = (&information, &scatter);
-        let patches = at.frames[k].samples as f64 / patch;
+        let patches = at.frames[k].samples as f64 / PATCH as f64;
         Overdispersion::of_frame(context, estimate, blocks, patches)
     };
     let frames = solution.unknowns.frames.iter().enumerate();

@@ -68,12 +68,9 @@ pub fn estimate_readout(
         ..context.clone()
     };
     let level = options.handover_level(context.camera.shorter_side());
-    let sampling = Sampling {
-        information: options.intermediate_information,
-        ..Sampling::of(level)
-    };
     let window = states.window_of(frame_range.clone(), frame_range);
-    let problem = PhotometricProblem::new(context, sampling, window)?.with_shared_parameters();
+    let problem =
+        PhotometricProblem::new(context, Sampling::of(level), window)?.with_shared_parameters();
     if problem.tiles() == 0 {
         return Ok(None);
     }
