@@ -116,6 +116,32 @@ fn init_finds_the_parts_of_a_recording() {
 }
 
 #[test]
+fn init_says_which_topics_cannot_be_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let pictures = simulated(dir.path());
+    let mut survey = Survey::open(&pictures).unwrap();
+    survey.camera.fx = 1e-3;
+    let messages = messages_of(&survey, Wire::Ros1);
+    let folder = recorded(&pictures, "robot.bag", |path| write_bag(path, &messages));
+    std::fs::remove_file(folder.join("groundtruth.tum")).unwrap();
+    let init = [
+        "init",
+        text(&folder),
+        "--radius-m",
+        "3",
+        "--force",
+        "--json",
+    ];
+    let said: Value = serde_json::from_str(&succeed(&init)).unwrap();
+    assert_eq!(said["calibration"], Value::Null, "{said}");
+    let aside = said["left_aside"].to_string();
+    assert!(
+        aside.contains("robot.bag") && aside.contains("fx is 0.001"),
+        "{said}"
+    );
+}
+
+#[test]
 fn topics_are_chosen_by_name() {
     let dir = tempfile::tempdir().unwrap();
     let pictures = simulated(dir.path());

@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 /// The frames are the largest group of pictures in one folder, or the images of a recording, or
 /// those of a video, if there are no pictures. A calibration that fits their size and poses of the
 /// same number are preferred. Poses of structure from motion on a straight line tell the tunnel's
-/// axis, which is written to axis.json. The command prints what it took, what it left aside and why,
-/// and what is missing.
+/// axis, which is written to axis.json. The command prints what it took, what it left aside and
+/// why, and what is missing.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch init my-survey --radius-m 1.5\n  \

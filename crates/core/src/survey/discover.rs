@@ -106,7 +106,11 @@ impl Discovery {
                 found.videos.push(file.clone());
             } else if is_recording(file) {
                 match FoundInRecording::of(folder, file) {
-                    Ok(recorded) => found.take_recording(file, recorded),
+                    Ok(recorded) => {
+                        let reasons = recorded.refusals.iter();
+                        aside.extend(reasons.map(|reason| (file.clone(), reason.clone())));
+                        found.take_recording(file, recorded);
+                    }
                     Err(reason) => aside.push((file.clone(), reason)),
                 }
             } else if !file.ends_with(SURVEY_FILE)

@@ -2,9 +2,11 @@
 
 use crate::frames::{FrameError, FrameFile, RecordedImages};
 use std::cmp::Reverse;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
+use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::recordings::{MessageKind, PoseTopic, Recording, Topic, TopicGroup};
 use tunnelstitch_geometry::trajectory::{
     DuplicateTimes, PoseFile, PoseFileOptions, read_poses_with,
@@ -41,6 +43,8 @@ pub(super) struct FoundInRecording {
     pub parts: RecordedParts,
     pub poses: Option<PoseFile>,
     pub camera: Option<Camera>,
+    /// The topics of poses and calibrations that cannot be read, with the reasons.
+    pub refusals: Vec<String>,
 }
 
 impl FoundInRecording {
@@ -52,11 +56,16 @@ impl FoundInRecording {
         let path = folder.join(file);
         let recording = Recording::open(&path).map_err(|error| error.reason())?;
         let images = frames(&recording).map_err(|error| error.to_string())?;
-        let poses = poses(&recording);
+        let mut refusals = Vec::new();
+        let poses = poses(&recording, &mut refusals);
         let near = images.as_ref().map_or("", |images| images.topic.as_str());
-        let calibration = calibration(&recording, near);
+        let calibration = calibration(&recording, near, &mut refusals);
         if images.is_none() && poses.is_none() && calibration.is_none() {
-            return Err("a recording without images, poses and calibrations".to_owned());
+            refusals.insert(
+                0,
+                "a recording without images, poses and calibrations".to_owned(),
+            );
+            return Err(refusals.join("; "));
         }
         let (poses_topic, poses) = poses.unzip();
         let (calibration, camera) = calibration.unzip();
@@ -69,6 +78,7 @@ impl FoundInRecording {
             },
             poses,
             camera,
+            refusals,
         })
     }
 }
@@ -96,7 +106,7 @@ fn frames(recording: &Recording) -> Result<Option<RecordedFrames>, FrameError> {
 }
 
 /// The first topic of poses that can be read, transforms last.
-fn poses(recording: &Recording) -> Option<(String, PoseFile)> {
+fn poses(recording: &Recording, refusals: &mut Vec<String>) -> Option<(String, PoseFile)> {
     let mut topics = by_count(recording, TopicGroup::Poses);
     let is_transforms = |topic: &Topic| matches!(topic.content, Some((MessageKind::Transforms, _)));
     topics.sort_by_key(|topic| is_transforms(topic));
@@ -109,14 +119,18 @@ fn poses(recording: &Recording) -> Option<(String, PoseFile)> {
             duplicate_times: DuplicateTimes::Merge,
             ..PoseFileOptions::default()
         };
-        let read = read_poses_with(recording.path(), &options).ok()?;
-        Some((topic.name.clone(), read))
+        let read = read_poses_with(recording.path(), &options);
+        Some((topic.name.clone(), taken(read, recording, refusals)?))
     })
 }
 
 /// The first calibration that can be read; that of the images' namespace (`/camera/camera_info`
 /// beside `/camera/image_raw`) is tried first.
-fn calibration(recording: &Recording, images: &str) -> Option<(String, Camera)> {
+fn calibration(
+    recording: &Recording,
+    images: &str,
+    refusals: &mut Vec<String>,
+) -> Option<(String, Camera)> {
     let namespace = |name: &str| name.rsplit_once('/').map(|(space, _)| space.to_owned());
     let mut topics = by_count(recording, TopicGroup::Calibrations);
     topics.sort_by_key(|topic| {
@@ -124,7 +138,22 @@ fn calibration(recording: &Recording, images: &str) -> Option<(String, Camera)> 
         !images.starts_with(&(space + "/"))
     });
     topics.into_iter().find_map(|topic| {
-        let camera = read_calibration(recording.path(), Some(&topic.name)).ok()?;
-        Some((topic.name.clone(), camera))
+        let camera = read_calibration(recording.path(), Some(&topic.name));
+        Some((topic.name.clone(), taken(camera, recording, refusals)?))
     })
+}
+
+/// A part that can be read; else the reason is added to the refusals.
+fn taken<T, E: Display>(
+    read: Result<T, E>,
+    recording: &Recording,
+    refusals: &mut Vec<String>,
+) -> Option<T> {
+    let own = printed(recording.path()).to_string();
+    read.map_err(|error| {
+        let said = error.to_string();
+        let said = said.strip_prefix(&own).unwrap_or(&said);
+        refusals.push(said.trim_start_matches([':', ' ']).to_owned());
+    })
+    .ok()
 }
