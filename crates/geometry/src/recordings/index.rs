@@ -2,7 +2,7 @@
 
 use super::place::{Chunk, Place};
 use super::stamp::Header;
-use super::topic::{Message, MessageKind, Topic, Wire};
+use super::topic::{Message, MessageKind, Topic, TopicGroup, Wire};
 use std::collections::HashMap;
 
 /// Largest number of messages that are read, each of which takes 48 bytes of memory: those of a
@@ -24,6 +24,12 @@ pub struct Index {
 }
 
 impl Index {
+    /// True if a topic of a group and name has a message.
+    pub fn has_message(&self, group: TopicGroup, name: &str) -> bool {
+        let mut topics = self.topics.iter();
+        topics.any(|topic| topic.count > 0 && topic.name == name && topic.is_of(group))
+    }
+
     /// Adds a channel, which is a source of a topic's messages; `wire` is their serialisation, if
     /// it is read.
     ///

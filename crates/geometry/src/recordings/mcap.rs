@@ -31,11 +31,14 @@ const DATA_END: u8 = 15;
 const RECORD_HEADER_BYTES: usize = 9;
 const REMEDY: &str = "copy it anew, or save what is left of it by `mcap recover FILE --output NEW`";
 
-/// Reads the index of an MCAP file.
+/// Reads the index of an MCAP file, from its start until `is_enough`, or its end.
 ///
 /// # Errors
 /// An unreadable, damaged or cut-off file.
-pub(super) fn read_index(path: &Path) -> Result<Index, RecordingError> {
+pub(super) fn read_index(
+    path: &Path,
+    is_enough: impl Fn(&Index) -> bool,
+) -> Result<Index, RecordingError> {
     let mut file = RecordFile::open(path, REMEDY)?;
     if file.array::<8>()? != MAGIC {
         return Err(file.damaged("it does not begin as MCAP files do"));
@@ -51,6 +54,9 @@ pub(super) fn read_index(path: &Path) -> Result<Index, RecordingError> {
                 let content = file.bytes(length)?;
                 walk.take_from_file(opcode, &content, position)
                     .map_err(|what| file.damaged(what))?;
+                if is_enough(&walk.index) {
+                    return Ok(walk.index);
+                }
             }
             _ => file.skip(length)?,
         }

@@ -38,9 +38,26 @@ impl Recording {
     /// # Errors
     /// An unreadable, damaged or cut-off file.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        Self::open_until(path, |_| false)
+    }
+
+    /// Reads a recording up to the first message of a topic, or to its end if the topic is not
+    /// there.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is damaged or cut off before.
+    pub fn open_to_first(
+        path: &Path,
+        group: TopicGroup,
+        topic: &str,
+    ) -> Result<Self, RecordingError> {
+        Self::open_until(path, |index| index.has_message(group, topic))
+    }
+
+    fn open_until(path: &Path, is_enough: impl Fn(&Index) -> bool) -> Result<Self, RecordingError> {
         let index = match is_bag(path) {
-            true => rosbag::read_index(path)?,
-            false => mcap::read_index(path)?,
+            true => rosbag::read_index(path, is_enough)?,
+            false => mcap::read_index(path, is_enough)?,
         };
         let Index { topics, chunks, .. } = index;
         Ok(Self {

@@ -28,11 +28,14 @@ const CHUNK: u8 = 5;
 const CONNECTION: u8 = 7;
 const REMEDY: &str = "copy it anew, or save what is left of it by `rosbag reindex FILE`";
 
-/// Reads the index of a bag.
+/// Reads the index of a bag, from its start until `is_enough`, or its end.
 ///
 /// # Errors
 /// An unreadable, damaged or cut-off file.
-pub(super) fn read_index(path: &Path) -> Result<Index, RecordingError> {
+pub(super) fn read_index(
+    path: &Path,
+    is_enough: impl Fn(&Index) -> bool,
+) -> Result<Index, RecordingError> {
     let mut file = RecordFile::open(path, REMEDY)?;
     if file.array()? != MAGIC {
         return Err(file.damaged("it does not begin as bags of version 2.0 do"));
@@ -49,6 +52,9 @@ pub(super) fn read_index(path: &Path) -> Result<Index, RecordingError> {
                 let data = file.bytes(bytes)?;
                 walk.take_from_file(op, &header, &data, position)
                     .map_err(|what| file.damaged(what))?;
+                if is_enough(&walk.index) {
+                    return Ok(walk.index);
+                }
             }
             _ => file.skip(bytes)?,
         }

@@ -1,6 +1,7 @@
 //! Recordings that the writers of other people made (`fixtures/recordings/make.py`), whole, cut off
 //! and damaged.
 
+use super::error::RecordingError;
 use super::picture::RecordedPicture;
 use super::recorded_pose::PoseTopic;
 use super::recording::Recording;
@@ -64,6 +65,25 @@ fn images_are_those_that_were_recorded() {
             panic!("{name}: {read:?}");
         };
         assert!(file.format == "png" && file.data.starts_with(b"\x89PNG"));
+    }
+}
+
+#[test]
+fn a_recording_is_read_no_further_than_to_a_first_message() {
+    for name in FILES {
+        let size = std::fs::metadata(fixture(name)).unwrap().len() as usize;
+        let bytes = &std::fs::read(fixture(name)).unwrap()[..size / 2];
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let open = |topic: &str| {
+            let group = TopicGroup::Calibrations;
+            let recording = Recording::open_to_first(&path, group, topic)?;
+            Ok(recording.topic(group, Some(topic))?.messages.len())
+        };
+        assert!(matches!(open("/camera/camera_info"), Ok(1..3)), "{name}");
+        let said: RecordingError = open("/camera").unwrap_err();
+        assert!(said.to_string().contains("cut off"), "{name}: {said}");
     }
 }
 

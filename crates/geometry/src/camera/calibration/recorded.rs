@@ -12,7 +12,10 @@ use std::path::Path;
 /// # Errors
 /// A recording that cannot be read, no such topic, a message that ends too early.
 pub fn read_info(path: &Path, topic: Option<&str>) -> Result<CameraInfo, CalibrationError> {
-    let recording = Recording::open(path)?;
+    let recording = match topic {
+        Some(topic) => Recording::open_to_first(path, TopicGroup::Calibrations, topic)?,
+        None => Recording::open(path)?,
+    };
     let topic = recording.topic(TopicGroup::Calibrations, topic)?;
     let mut reader = recording.reader()?;
     let first = topic.messages.first().zip(topic.content);
