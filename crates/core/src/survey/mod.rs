@@ -22,7 +22,7 @@
 //! [frames]
 //! images = "frames/*.jpg"     # sorted by name; or
 //! # video = "survey.mp4"      # pictures of a video, read by ffmpeg, with its times
-//! # bag = "survey.mcap"       # images of a recording, with the times of their headers
+//! # bag = "survey.mcap"       # images of a recording (MCAP, ROS 1 bag), times of their headers
 //! # topic = "/camera/image"   # in a recording with several topics of images
 //! # every = 5                 # sampling interval, pictures
 //! # angle_step_deg = 15.0     # keyframes by rotation of the view; needs associate = "time"

@@ -53,7 +53,8 @@ impl Discovery {
                 text,
                 "# No calibration was found: OpenCV, ROS or Kalibr YAML, COLMAP's cameras.txt or \
                  cameras.bin, nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, \
-                 Meshroom or Metashape, a lens profile of Gyroflow, or our camera.json.\n\
+                 Meshroom or Metashape, a lens profile of Gyroflow, a recording with \
+                 CameraInfo, or our camera.json.\n\
                  file = \"camera.json\""
             ),
         };
@@ -170,7 +171,8 @@ impl Discovery {
         let (count, _) = self.frames();
         let Some((path, poses)) = self.initial() else {
             *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC, OpenSfM, \
-                      Bundler, Meshroom, OpenMVG, Metashape, RealityCapture or Pix4D.\n\
+                      Bundler, Meshroom, OpenMVG, Metashape, RealityCapture, Pix4D or a \
+                      recording.\n\
                       initial = \"baseline.tum\"\n";
             return;
         };
