@@ -8,12 +8,15 @@ use crate::survey::Survey;
 /// files, the even rows are kept and stretched.
 pub fn interlacing_warning(survey: &Survey) -> String {
     let frames = &survey.file.frames;
-    let remedy = match (&frames.video, &frames.images) {
-        (Some(video), _) => format!(
+    let remedy = match (&frames.video, &frames.bag, &frames.images) {
+        (Some(video), ..) => format!(
             "ffmpeg -i {} -vf bwdif=mode=send_frame -c:v libx264 -crf 12 deinterlaced.mp4",
             video.display()
         ),
-        (None, images) => format!(
+        (None, Some(_), _) => {
+            "let the driver of the camera do so, or record whole pictures".to_owned()
+        }
+        (None, None, images) => format!(
             "mkdir deinterlaced; ffmpeg -pattern_type glob -i '{}' -vf field=top,scale=iw:2*ih \
              -start_number 0 deinterlaced/%06d.png (and add 0.5 to cy of the calibration)",
             images.as_deref().unwrap_or("frames/*.png")

@@ -22,6 +22,12 @@ done
 seed discovery camera 0 <$blender/camera.json
 seed discovery poses 3 <$blender/baseline.tum
 seed poses tum 0 <$blender/baseline.tum
+for name in zstd unchunked ros1; do
+    seed recordings "$name.mcap" 0 <"fixtures/recordings/$name.mcap"
+done
+for name in plain bz2; do
+    seed recordings "$name.bag" 1 <"fixtures/recordings/$name.bag"
+done
 
 # The survey that the targets simulate, and what the program makes of it.
 small=$work/small

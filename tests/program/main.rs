@@ -34,6 +34,7 @@ mod points;
 mod poses;
 mod real_light_and_views;
 mod real_pictures;
+mod recordings;
 mod refine;
 mod report;
 mod resume;

@@ -381,7 +381,7 @@ fn what_is_wrong_with_a_video_is_said() {
     edit(&toml, "\"a.mkv\"", "\"a.mkv\"\nevery = 0");
     refine(&["survey.toml", "every is 0"]);
     edit(&toml, "\"a.mkv\"", "\"a.mkv\"\nimages = \"*.jpg\"");
-    refine(&["survey.toml", "both images and video"]);
+    refine(&["survey.toml", "more than one of images, video and bag"]);
     edit(&toml, "video = \"a.mkv\"", "");
     refine(&["survey.toml", "neither images", "nor video"]);
     let without = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))

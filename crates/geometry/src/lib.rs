@@ -5,5 +5,6 @@
 pub mod camera;
 pub mod files;
 pub mod numerics;
+pub mod recordings;
 pub mod surface;
 pub mod trajectory;

@@ -197,6 +197,8 @@ fn write_text_files(
         frames: FramesSection {
             images: Some(format!("frames/*.{}", frame_format(options).1)),
             video: None,
+            bag: None,
+            topic: None,
             every: None,
             angle_step_deg: None,
             times: None,

@@ -69,6 +69,17 @@ pub fn run(
     refuse_overwriting(std::slice::from_ref(out), survey_files(&survey))?;
     let inputs = record::hash_survey(&survey, arguments.poses.file())?;
     let has_names = !matches!(arguments.to, OutputFormat::Tum | OutputFormat::Kitti);
+    let recorded = survey
+        .frames
+        .iter()
+        .find(|frame| frame.shared_file().is_some() && !frame.is_in_video() && has_names);
+    if let Some(frame) = recorded {
+        terminal.warn(format!(
+            "the frames are images of a recording, named {} and so on; other programs need them \
+             as files of these names",
+            printed(&frame.path)
+        ));
+    }
     if let Some(frame) = survey
         .frames
         .iter()

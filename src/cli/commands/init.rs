@@ -13,10 +13,11 @@ use std::path::{Path, PathBuf};
 /// Searches a folder for frames, calibration and poses, and writes a commented survey.toml for
 /// them.
 ///
-/// The frames are the largest group of pictures in one folder, or those of a video if there are no
-/// pictures. A calibration that fits their size and poses of the same number are preferred. Poses
-/// of structure from motion on a straight line tell the tunnel's axis, which is written to
-/// axis.json. The command prints what it took, what it left aside and why, and what is missing.
+/// The frames are the largest group of pictures in one folder, or the images of a recording, or
+/// those of a video, if there are no pictures. A calibration that fits their size and poses of the
+/// same number are preferred. Poses of structure from motion on a straight line tell the tunnel's
+/// axis, which is written to axis.json. The command prints what it took, what it left aside and
+/// why, and what is missing.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch init my-survey --radius-m 1.5\n  \
@@ -83,6 +84,7 @@ fn report<'a>(path: &'a Path, found: &'a Discovery, missing: Option<String>) -> 
         survey_file: path,
         images: found.picture_frames().map(|group| group.pattern.as_str()),
         video: found.video.as_ref().map(|video| video.path.as_path()),
+        recording: found.recorded.as_ref().map(|(path, _)| path.as_path()),
         mask: found.mask.as_deref(),
         calibration: found.calibrations.first().map(|(path, _)| path.as_path()),
         initial_poses: found.initial().map(|(path, _)| path.as_path()),
@@ -149,6 +151,7 @@ struct InitReport<'a> {
     survey_file: &'a Path,
     images: Option<&'a str>,
     video: Option<&'a Path>,
+    recording: Option<&'a Path>,
     mask: Option<&'a Path>,
     calibration: Option<&'a Path>,
     initial_poses: Option<&'a Path>,
@@ -168,6 +171,7 @@ fn choose_frames(arguments: &InitArguments, found: &mut Discovery) -> Result<(),
     let folder = &arguments.folder;
     let video = match &arguments.video {
         Some(video) => Some(relative_to(folder, video)),
+        None if found.pictures.is_empty() && found.choose_recording() => None,
         None if found.pictures.is_empty() => found.videos.first().cloned(),
         None => None,
     };
@@ -176,6 +180,10 @@ fn choose_frames(arguments: &InitArguments, found: &mut Discovery) -> Result<(),
             found.choose_video(folder, &video, arguments.every.unwrap_or(1) as usize)?;
             Ok(())
         }
+        None if found.recorded.is_some() && arguments.every.is_some() => Err(Failure::usage(
+            "--every needs a video; for a recording, write `every` under [frames] of survey.toml",
+        )),
+        None if found.recorded.is_some() => Ok(()),
         None if found.pictures.is_empty() => Err(no_frames(folder, found)),
         None if arguments.every.is_some() => Err(Failure::usage(
             "--every needs a video, but the folder holds pictures: name the video with --video",
@@ -194,8 +202,8 @@ fn no_frames(folder: &Path, found: &Discovery) -> Failure {
         format!("; {} ({}): {}", aside.pattern, aside.count, aside.reason)
     });
     Failure::input(format!(
-        "{}: holds no pictures (JPEG, PNG, TIFF, WebP) and no video, up to three folders \
-         below{unread}",
+        "{}: holds no pictures (JPEG, PNG, TIFF, WebP), no recording (MCAP, ROS 1 bag) of \
+         some and no video, up to three folders below{unread}",
         printed(folder)
     ))
 }

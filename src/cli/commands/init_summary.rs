@@ -36,16 +36,37 @@ fn frames(found: &Discovery) -> Vec<String> {
         let text = format!("{path} ({count} pictures, {width} × {height} px)");
         lines.push(row("frames", text));
     }
+    if let Some((path, images)) = &found.recorded {
+        let (path, topic, count) = (printed(path), &images.topic, images.count);
+        let size = images.size;
+        let size = size.map_or("unreadable".to_owned(), |(w, h)| format!("{w} × {h} px"));
+        let text = format!("{path}, topic {topic} ({count} images, {size})");
+        lines.push(row("frames", text));
+        for other in &images.others {
+            let text = format!("{other}: it has not more; topic under [frames] takes it");
+            lines.push(row("other topic", text));
+        }
+    }
     if let Some(group) = found.picture_frames() {
         lines.push(row("frames", pictures(group, &reading(found))));
     }
     let chosen = found.video.as_ref().map(|video| &video.path);
     let why = match chosen {
         Some(_) => "another video is taken",
+        None if found.recorded.is_some() => "there is a recording; --video takes it",
         None => "there are pictures; --video takes it",
     };
     for video in found.videos.iter().filter(|video| Some(*video) != chosen) {
         lines.push(row("other video", format!("{}: {why}", printed(video))));
+    }
+    let taken = found.recorded.as_ref().map(|(path, _)| path);
+    let others = found
+        .recordings
+        .iter()
+        .filter(|parts| Some(&parts.path) != taken);
+    for parts in others.filter(|parts| parts.images.is_some()) {
+        let text = format!("{}: its images are not taken", printed(&parts.path));
+        lines.push(row("other recording", text));
     }
     let (taken, why) = match chosen {
         Some(_) => (0, "a video is taken"),

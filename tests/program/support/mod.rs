@@ -5,6 +5,7 @@ pub mod chromium;
 pub mod missing;
 pub mod npm;
 pub mod outputs;
+pub mod recorder;
 pub mod server;
 
 use std::path::{Path, PathBuf};

@@ -4,7 +4,8 @@ use super::error::FrameError;
 use super::frame_file::{FrameFile, FrameSource};
 use super::picture_decoder::{Content, Input, decoder, open_picture};
 use super::picture_end::{is_jpeg, jpeg_is_complete, truncated, truncation};
-use super::picture_reading::PictureOrientation;
+use super::picture_reading::{PictureOrientation, PictureReading};
+use super::recorded_images::{RecordedImage, RecordedImages};
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, GrayImage, ImageDecoder, RgbImage};
 
@@ -17,6 +18,19 @@ impl FrameFile {
         match &self.source {
             FrameSource::Video(video, _) => Ok(video.size()),
             FrameSource::Memory(picture) => Ok((picture.width(), picture.height())),
+            FrameSource::Recording(images, image, reading) => {
+                let read = self.recorded(images, *image)?;
+                let (size, named) = match read {
+                    RecordedImage::Pixels(pixels) => {
+                        ((pixels.width(), pixels.height()), Orientation::NoTransforms)
+                    }
+                    RecordedImage::File(content) => {
+                        let mut header = self.content_header(&content)?;
+                        (header.dimensions(), orientation(&mut header))
+                    }
+                };
+                Ok(turned_size(size, reading.orientation.turn(named)))
+            }
             FrameSource::File(reading) => {
                 let mut header = self.header()?;
                 let turn = reading.orientation.turn(orientation(&mut header));
@@ -66,11 +80,25 @@ impl FrameFile {
     /// # Errors
     /// A missing or unknown file.
     pub fn exif_orientation(&self) -> Result<Option<u8>, FrameError> {
-        let FrameSource::File(_) = &self.source else {
-            return Ok(None);
+        let named = match &self.source {
+            FrameSource::File(_) => orientation(&mut self.header()?),
+            FrameSource::Recording(images, image, _) => match self.recorded(images, *image)? {
+                RecordedImage::Pixels(_) => return Ok(None),
+                RecordedImage::File(content) => orientation(&mut self.content_header(&content)?),
+            },
+            FrameSource::Video(..) | FrameSource::Memory(_) => return Ok(None),
         };
-        let named = orientation(&mut self.header()?);
         Ok((named != Orientation::NoTransforms).then(|| named.to_exif()))
+    }
+
+    /// Reads an image of a recording.
+    fn recorded(&self, images: &RecordedImages, image: usize) -> Result<RecordedImage, FrameError> {
+        images.read(image).map_err(|what| self.decode_error(what))
+    }
+
+    /// The decoder of a picture file in a recording after reading its header.
+    fn content_header(&self, content: &Content) -> Result<impl ImageDecoder, FrameError> {
+        decoder(content.input()).map_err(|error| self.decode_error(error.to_string()))
     }
 
     /// The decoder of a picture file after reading its header.
@@ -109,10 +137,37 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
             check((picture.width(), picture.height()))?;
             return Ok(DynamicImage::clone(picture));
         }
+        FrameSource::Recording(images, image, reading) => {
+            return match file.recorded(images, *image)? {
+                RecordedImage::File(content) => {
+                    decode_file(file, &content, reading, (width, height))
+                }
+                RecordedImage::Pixels(mut picture) => {
+                    picture.apply_orientation(reading.orientation.turn(Orientation::NoTransforms));
+                    check((picture.width(), picture.height()))?;
+                    reading.scale(picture).map_err(fail)
+                }
+            };
+        }
         FrameSource::File(reading) => reading,
     };
     let content =
         Content::of(&file.path, width, height).map_err(|error| fail(error.to_string()))?;
+    decode_file(file, &content, reading, (width, height))
+}
+
+/// Decodes the content of a frame's picture file, and checks its size.
+///
+/// # Errors
+/// The errors of [`load_colour`].
+fn decode_file(
+    file: &FrameFile,
+    content: &Content,
+    reading: &PictureReading,
+    (width, height): (u32, u32),
+) -> Result<DynamicImage, FrameError> {
+    let check = |found| file.check_size(found, (width, height));
+    let fail = |what: String| file.decode_error(what);
     let bytes = content.as_ref();
     if is_jpeg(bytes) && !jpeg_is_complete(bytes) {
         return Err(fail(truncated("JPEG")));
@@ -169,6 +224,10 @@ pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
     match &file.source {
         FrameSource::Video(video, _) => Ok(video.colour()),
         FrameSource::Memory(picture) => Ok(picture.color()),
+        FrameSource::Recording(images, image, _) => match file.recorded(images, *image)? {
+            RecordedImage::Pixels(pixels) => Ok(pixels.color()),
+            RecordedImage::File(content) => Ok(file.content_header(&content)?.color_type()),
+        },
         FrameSource::File(_) => Ok(file.header()?.color_type()),
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use tunnelstitch_geometry::files::printed;
+use tunnelstitch_geometry::recordings::RecordingError;
 
 /// An error of a frame, a video or a mask.
 #[derive(Debug, thiserror::Error)]
@@ -43,6 +44,9 @@ pub enum FrameError {
         /// The problem and the remedy.
         what: String,
     },
+    /// A recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
     /// A mask is unreadable or invalid.
     #[error("{}: {what}", printed(path))]
     Mask {

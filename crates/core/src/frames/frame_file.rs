@@ -1,7 +1,8 @@
-//! Frames as files, as pictures of a video, or in memory.
+//! Frames as files, as pictures of a video or a recording, or in memory.
 
 use super::error::FrameError;
 use super::picture_reading::PictureReading;
+use super::recorded_images::RecordedImages;
 use super::unread_format::UnreadFormat;
 use super::video::Video;
 use alphanumeric_sort::compare_path;
@@ -14,6 +15,10 @@ use tunnelstitch_geometry::files::printed;
 const RESTORE_OR_SKIP: &str = "restore the file, or leave out what cannot be read by --skip-bad \
                                (skip_bad = true under [frames])";
 
+/// The remedy for an image of a recording that cannot be read.
+const OR_SKIP: &str = "or leave out what cannot be read by --skip-bad (skip_bad = true under \
+                       [frames])";
+
 /// The place that a frame's pixels come from.
 #[derive(Clone, Debug)]
 pub(super) enum FrameSource {
@@ -21,17 +26,20 @@ pub(super) enum FrameSource {
     File(PictureReading),
     /// A video, and the index of the picture.
     Video(Arc<Video>, usize),
+    /// A recording, the number of the image, and its reading.
+    Recording(Arc<RecordedImages>, usize, PictureReading),
     /// A picture in memory.
     Memory(Arc<DynamicImage>),
 }
 
-/// A frame in a file of its own, in a video, or in memory.
+/// A frame in a file of its own, in a video, in a recording, or in memory.
 #[derive(Clone, Debug)]
 pub struct FrameFile {
     /// Index of the frame in the survey.
     pub index: usize,
     /// Path of the picture, or the video's path followed by the picture's number:
-    /// `survey.mp4/000012`; a name only, for a picture in memory.
+    /// `survey.mp4/000012`; the recording's with the image's number, `survey.mcap#000012`; a name
+    /// only, for a picture in memory.
     pub path: PathBuf,
     /// Its pixels.
     pub(super) source: FrameSource,
@@ -47,18 +55,18 @@ impl FrameFile {
         }
     }
 
-    /// The frame with its picture file read as given; no other frame changes.
+    /// The frame with its picture file or recorded image read as given; no other frame changes.
     pub fn with_reading(mut self, reading: PictureReading) -> Self {
-        if let FrameSource::File(own) = &mut self.source {
+        if let FrameSource::File(own) | FrameSource::Recording(_, _, own) = &mut self.source {
             *own = reading;
         }
         self
     }
 
-    /// The reading of its picture file; None for other frames.
+    /// The reading of its picture file or recorded image; None for other frames.
     pub fn reading(&self) -> Option<PictureReading> {
         match &self.source {
-            FrameSource::File(reading) => Some(*reading),
+            FrameSource::File(reading) | FrameSource::Recording(_, _, reading) => Some(*reading),
             FrameSource::Video(..) | FrameSource::Memory(_) => None,
         }
     }
@@ -69,6 +77,16 @@ impl FrameFile {
             index,
             path: video.path().join(format!("{picture:06}")),
             source: FrameSource::Video(Arc::clone(video), picture),
+        }
+    }
+
+    /// An image of a recording, numbered from 0.
+    pub fn in_recording(index: usize, images: &Arc<RecordedImages>, image: usize) -> Self {
+        let reading = PictureReading::default();
+        Self {
+            index,
+            path: images.name(image),
+            source: FrameSource::Recording(Arc::clone(images), image, reading),
         }
     }
 
@@ -85,6 +103,7 @@ impl FrameFile {
     pub fn file(&self) -> &Path {
         match &self.source {
             FrameSource::Video(video, _) => video.path(),
+            FrameSource::Recording(images, ..) => images.path(),
             FrameSource::File(_) | FrameSource::Memory(_) => &self.path,
         }
     }
@@ -94,9 +113,21 @@ impl FrameFile {
         matches!(self.source, FrameSource::Video(..))
     }
 
+    /// The file, if it contains other frames, too.
+    pub fn shared_file(&self) -> Option<&Path> {
+        match &self.source {
+            FrameSource::Video(video, _) => Some(video.path()),
+            FrameSource::Recording(images, ..) => Some(images.path()),
+            FrameSource::File(_) | FrameSource::Memory(_) => None,
+        }
+    }
+
     /// The format of a picture file, if it is one that is not read.
     pub(super) fn unread_format(&self) -> Option<UnreadFormat> {
-        self.reading().and_then(|_| UnreadFormat::of(&self.path))
+        match &self.source {
+            FrameSource::File(_) => UnreadFormat::of(&self.path),
+            _ => None,
+        }
     }
 
     /// The error of a frame that cannot be decoded; of a format that is not read it names the
@@ -108,6 +139,7 @@ impl FrameFile {
                 format.remedy(&self.path),
             ),
             (FrameSource::File(_), None) => (what, RESTORE_OR_SKIP.to_owned()),
+            (FrameSource::Recording(..), None) => (what, OR_SKIP.to_owned()),
             (FrameSource::Video(..), None) => (what, "restore the file".to_owned()),
             (FrameSource::Memory(_), None) => {
                 (what, "leave out the picture and its pose".to_owned())

@@ -16,6 +16,8 @@ mod picture_decoder;
 mod picture_end;
 mod picture_reading;
 mod pyramid;
+mod recorded_images;
+mod recorded_pixels;
 mod shading;
 mod static_pixels;
 mod stored_frame;
@@ -40,6 +42,7 @@ pub use noise::{noise_at_level, noise_sigma};
 pub use picture_decoder::open_picture;
 pub use picture_reading::{PictureOrientation, PictureReading};
 pub use pyramid::Pyramid;
+pub use recorded_images::RecordedImages;
 pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
 pub use static_pixels::{
     MotionCell, MotionField, StaticPixels, TemporalStatistics, find_static_pixels,

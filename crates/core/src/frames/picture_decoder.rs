@@ -100,6 +100,14 @@ impl Content {
         Ok(Self(Rc::new(buffer)))
     }
 
+    /// The content of a file that is a part of another.
+    pub fn copied(bytes: &[u8]) -> Self {
+        let mut buffer = Buffer(ROOM.take());
+        buffer.0.clear();
+        buffer.0.extend_from_slice(bytes);
+        Self(Rc::new(buffer))
+    }
+
     /// An input for a decoder, from the content's start.
     pub fn input(&self) -> Input {
         Input::Content(Cursor::new(self.clone()))

@@ -37,8 +37,9 @@ impl Survey {
             let pattern = Path::new(&escaped).join(&*images);
             *images = pattern.to_string_lossy().into_owned();
         }
-        if let Some(video) = &mut file.frames.video {
-            *video = folder.join(&*video);
+        let frames = &mut file.frames;
+        for path in frames.video.iter_mut().chain(&mut frames.bag) {
+            *path = folder.join(&*path);
         }
         file.calibrate = None;
         file.options.clear();

@@ -3,12 +3,14 @@
 use super::file::SURVEY_FILE;
 use super::left_aside::{LeftAside, reason_by_name, reason_of_text};
 use super::picture_group::PictureGroup;
+use super::recorded_parts::{FoundInRecording, RecordedFrames, RecordedParts};
 use super::straight_axis::{AXIS_FILE, FoundAxis};
 use crate::frames::{FrameError, PictureOrientation, Video};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
+use tunnelstitch_geometry::recordings::is_recording;
 use tunnelstitch_geometry::trajectory::{
     DuplicateTimes, PoseFile, PoseFileOptions, read_poses_with,
 };
@@ -47,6 +49,11 @@ pub struct Discovery {
     pub videos: Vec<PathBuf>,
     /// The video of the frames, if one was chosen ([`Discovery::choose_video`]).
     pub video: Option<VideoChoice>,
+    /// The recordings with images, poses or calibrations.
+    pub recordings: Vec<RecordedParts>,
+    /// The images of the frames, if they are of a recording ([`Discovery::choose_recording`]), and
+    /// the recording, relative to the searched folder.
+    pub recorded: Option<(PathBuf, RecordedFrames)>,
     /// Groups of pictures, the largest first.
     pub pictures: Vec<PictureGroup>,
     /// Calibrations, those with the frames' size first.
@@ -97,6 +104,15 @@ impl Discovery {
                 }
             } else if VIDEO_EXTENSIONS.contains(&lower.as_str()) {
                 found.videos.push(file.clone());
+            } else if is_recording(file) {
+                match FoundInRecording::of(folder, file) {
+                    Ok(recorded) => {
+                        let reasons = recorded.refusals.iter();
+                        aside.extend(reasons.map(|reason| (file.clone(), reason.clone())));
+                        found.take_recording(file, recorded);
+                    }
+                    Err(reason) => aside.push((file.clone(), reason)),
+                }
             } else if !file.ends_with(SURVEY_FILE)
                 && let Err(reason) = found.take_text(folder, file, &lower)
             {
@@ -110,6 +126,29 @@ impl Discovery {
         found.pictures = groups.iter().map(group).collect();
         found.sort();
         Ok(found)
+    }
+
+    /// Takes the parts of a recording.
+    fn take_recording(&mut self, file: &Path, found: FoundInRecording) {
+        let camera = found.camera.map(|camera| (file.to_owned(), camera));
+        self.calibrations.extend(camera);
+        let poses = found.poses.map(|poses| (file.to_owned(), poses));
+        self.poses.extend(poses);
+        self.recordings.push(found.parts);
+    }
+
+    /// Selects the images of the first recording that has some as the frames; false if there is
+    /// none.
+    pub fn choose_recording(&mut self) -> bool {
+        let images = |parts: &RecordedParts| Some((parts.path.clone(), parts.images.clone()?));
+        self.recorded = self.recordings.iter().find_map(images);
+        self.sort();
+        self.recorded.is_some()
+    }
+
+    /// The parts of a recording, by its path.
+    pub(super) fn parts_of(&self, path: &Path) -> Option<&RecordedParts> {
+        self.recordings.iter().find(|parts| parts.path == path)
     }
 
     /// Takes a file as calibration, as poses or as both.
@@ -195,9 +234,10 @@ impl Discovery {
         self.unit_m.is_none() && initial.is_some_and(|(_, poses)| poses.format.has_no_scale())
     }
 
-    /// The pictures that are the frames, if they are not those of a video.
+    /// The pictures that are the frames, if they are not those of a video or recording.
     pub fn picture_frames(&self) -> Option<&PictureGroup> {
-        self.pictures.first().filter(|_| self.video.is_none())
+        let has_pictures = self.video.is_none() && self.recorded.is_none();
+        self.pictures.first().filter(|_| has_pictures)
     }
 
     /// Decodes a dozen frames of the searched `folder`, if the calibration fits them, to find out
@@ -220,9 +260,10 @@ impl Discovery {
     /// Number of frames, and their size if known, pixels.
     pub fn frames(&self) -> (usize, Option<(u32, u32)>) {
         let pictures = self.pictures.first();
-        match &self.video {
-            Some(video) => (video.count, Some(video.size)),
-            None => pictures.map_or((0, None), |group| (group.count, group.size)),
+        match (&self.video, &self.recorded) {
+            (Some(video), _) => (video.count, Some(video.size)),
+            (None, Some((_, images))) => (images.count, images.size),
+            (None, None) => pictures.map_or((0, None), |group| (group.count, group.size)),
         }
     }
 

@@ -89,8 +89,14 @@ pub struct FramesSection {
     /// The video that contains the frames.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub video: Option<PathBuf>,
-    /// Sampling interval: every so many-th picture of the video is a frame, from the first on;
-    /// every picture by default.
+    /// The recording (MCAP, ROS 1 bag) that contains the frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bag: Option<PathBuf>,
+    /// The topic of the frames in the recording; by default the only one with images.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
+    /// Sampling interval: every so many-th picture of the video or recording is a frame, from the
+    /// first on; every picture by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every: Option<usize>,
     /// Keyframe selection: rotation between consecutive frames by the initial poses, degrees; the
@@ -229,6 +235,8 @@ mod tests {
             frames: FramesSection {
                 images: None,
                 video: Some("survey.mp4".into()),
+                bag: None,
+                topic: None,
                 every: Some(5),
                 angle_step_deg: Some(15.0),
                 times: Some("times.txt".into()),

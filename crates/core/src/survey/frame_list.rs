@@ -3,7 +3,7 @@
 use super::error::SurveyError;
 use super::file::FramesSection;
 use super::frame_times;
-use crate::frames::{self, FrameFile, PictureOrientation, PictureReading, Video};
+use crate::frames::{self, FrameFile, PictureOrientation, PictureReading, RecordedImages, Video};
 use std::path::Path;
 use std::sync::Arc;
 use tunnelstitch_geometry::files::printed;
@@ -12,7 +12,7 @@ use tunnelstitch_geometry::files::printed;
 pub(super) struct FrameList {
     /// The frames, sorted by name or time.
     pub frames: Vec<FrameFile>,
-    /// Times of the frames, seconds, if given by a file or a video.
+    /// Times of the frames, seconds, if given by a file, a video or a recording.
     pub times_s: Option<Vec<f64>>,
     /// The video that contains the frames, if any.
     pub video: Option<Arc<Video>>,
@@ -33,14 +33,65 @@ fn picture_reading(section: &FramesSection) -> Result<PictureReading, &'static s
     })
 }
 
+/// The interval of the frames among the pictures of a video or recording.
+///
+/// # Errors
+/// An interval of 0, in words.
+fn interval(section: &FramesSection) -> Result<usize, &'static str> {
+    match section.every {
+        Some(0) => Err("frames.every is 0; 1 takes every picture, 2 every other one"),
+        every => Ok(every.unwrap_or(1)),
+    }
+}
+
+/// Checks the keys that go with `images`; returns the reading of the files.
+///
+/// # Errors
+/// A key that goes with a video, in words; the errors of [`picture_reading`].
+fn check_images(section: &FramesSection) -> Result<PictureReading, &'static str> {
+    if section.angle_step_deg.is_some() {
+        return Err(
+            "frames.angle_step_deg goes with frames.video and frames.bag; for pictures, let \
+             frames.images match fewer of them",
+        );
+    }
+    if section.every.is_some() {
+        return Err(
+            "frames.every goes with frames.video and frames.bag; for pictures, let frames.images \
+             match fewer of them",
+        );
+    }
+    picture_reading(section)
+}
+
+/// Checks the keys that go with `video`; returns the interval of the frames.
+///
+/// # Errors
+/// A key that goes with pictures, in words; the errors of [`interval`].
+fn check_video(section: &FramesSection) -> Result<usize, &'static str> {
+    if section.skip_bad == Some(true) {
+        return Err(
+            "frames.skip_bad goes with frames.images and frames.bag; the pictures of a video \
+             cannot be left out singly",
+        );
+    }
+    if section.bits.is_some() || section.orientation.is_some() {
+        return Err(
+            "frames.bits and frames.orientation go with frames.images and frames.bag; videos tell \
+             both themselves",
+        );
+    }
+    interval(section)
+}
+
 impl FrameList {
     /// Finds the frames that the section of the survey at `toml_path` names, relative to its
     /// `folder`. `frame_times`: a file of their times, instead of the survey's. A mask in the same
     /// folder is not a frame.
     ///
     /// # Errors
-    /// Neither pictures nor a video, or both; a malformed pattern, no frames, a video that cannot
-    /// be read, a malformed file of times.
+    /// No pictures, video or recording, or more than one; a malformed pattern, no frames, a video
+    /// or recording that cannot be read, a malformed file of times.
     pub fn new(
         section: &FramesSection,
         toml_path: &Path,
@@ -52,59 +103,34 @@ impl FrameList {
             what: what.to_owned(),
         };
         let fail = |what: &str| Err(value(what));
-        let mut listing = match (&section.images, &section.video, section.every) {
-            (Some(_), None, None) if section.angle_step_deg.is_some() => {
-                return fail(
-                    "frames.angle_step_deg goes with frames.video; for pictures, let \
-                     frames.images match fewer of them",
-                );
-            }
+        if section.topic.is_some() && section.bag.is_none() {
+            return fail("frames.topic goes with frames.bag");
+        }
+        let mut listing = match (&section.images, &section.video, &section.bag) {
             (Some(pattern), None, None) => {
+                let reading = check_images(section).map_err(value)?;
                 let mask = section.mask.as_ref().map(|mask| folder.join(mask));
-                let reading = picture_reading(section).map_err(value)?;
                 let listed = frames::list_frames(folder, pattern, mask.as_deref())?;
-                let read = listed.into_iter().map(|frame| frame.with_reading(reading));
-                Self {
-                    frames: read.collect(),
-                    times_s: None,
-                    video: None,
-                }
+                Self::of_images(listed, reading)
             }
-            (None, Some(_), _) if section.skip_bad == Some(true) => {
-                return fail(
-                    "frames.skip_bad goes with frames.images; the pictures of a video cannot be \
-                     left out singly",
-                );
-            }
-            (None, Some(_), _) if section.bits.is_some() || section.orientation.is_some() => {
-                return fail(
-                    "frames.bits and frames.orientation go with frames.images; videos tell both \
-                     themselves",
-                );
-            }
-            (None, Some(_), Some(0)) => {
-                return fail(
-                    "frames.every is 0; 1 takes every picture of the video, 2 every other one",
-                );
-            }
-            (None, Some(video), every) => {
+            (None, Some(video), None) => {
+                let every = check_video(section).map_err(value)?;
                 let video = Arc::new(Video::open(&folder.join(video))?);
-                Self::of_video(video, every.unwrap_or(1))
+                Self::of_video(video, every)
             }
-            (Some(_), None, Some(_)) => {
+            (None, None, Some(bag)) => {
+                let every = interval(section).map_err(value)?;
+                let reading = picture_reading(section).map_err(value)?;
+                let images = RecordedImages::open(&folder.join(bag), section.topic.as_deref())?;
+                Self::of_recording(&Arc::new(images), every, reading)
+            }
+            (None, None, None) => {
                 return fail(
-                    "frames.every goes with frames.video; for pictures, let frames.images match \
-                     fewer of them",
+                    "frames has neither images (a pattern, as \"frames/*.jpg\"), nor video, nor \
+                     bag (a file)",
                 );
             }
-            (None, None, _) => {
-                return fail(
-                    "frames has neither images (a pattern, as \"frames/*.jpg\") nor video (a file)",
-                );
-            }
-            (Some(_), Some(_), _) => {
-                return fail("frames has both images and video; take one away");
-            }
+            _ => return fail("frames has more than one of images, video and bag; keep one"),
         };
         let own = section.times.as_ref().map(|times| folder.join(times));
         if let Some(path) = frame_times.or(own.as_deref()) {
@@ -138,6 +164,27 @@ impl FrameList {
             self.frames = frames.map(|frame| frame.with_reading(turned)).collect();
         }
         (self, Some(orientation_warning(&file, number, is_turned)))
+    }
+
+    fn of_images(listed: Vec<FrameFile>, reading: PictureReading) -> Self {
+        let read = listed.into_iter().map(|frame| frame.with_reading(reading));
+        Self {
+            frames: read.collect(),
+            times_s: None,
+            video: None,
+        }
+    }
+
+    fn of_recording(images: &Arc<RecordedImages>, every: usize, reading: PictureReading) -> Self {
+        let numbers = || (0..images.count()).step_by(every);
+        let frame = |(index, image): (usize, usize)| {
+            FrameFile::in_recording(index, images, image).with_reading(reading)
+        };
+        Self {
+            frames: numbers().enumerate().map(frame).collect(),
+            times_s: Some(numbers().map(|image| images.time_s(image)).collect()),
+            video: None,
+        }
     }
 
     fn of_video(video: Arc<Video>, every: usize) -> Self {

@@ -31,7 +31,7 @@ impl Survey {
             ));
         }
         let section = &self.file.poses;
-        if section.associate != Some(Associate::Time) {
+        if section.associate() != Some(Associate::Time) {
             return fail(
                 "frames.angle_step_deg needs poses.associate = \"time\": the poses determine \
                  which pictures are frames"

@@ -77,6 +77,7 @@ pub(super) fn reason_by_name(folder: &Path, file: &Path, extension: &str) -> Str
     }
     match extension {
         "gcsv" => "a log of a gyro: tunnelstitch gyro makes poses of it".to_owned(),
+        "db3" => "a recording of ROS 2 in SQLite: ros2 bag convert makes MCAP of it".to_owned(),
         _ => "by its name no file of a survey".to_owned(),
     }
 }

@@ -22,6 +22,8 @@
 //! [frames]
 //! images = "frames/*.jpg"     # sorted by name; or
 //! # video = "survey.mp4"      # pictures of a video, read by ffmpeg, with its times
+//! # bag = "survey.mcap"       # images of a recording (MCAP, ROS 1 bag), times of their headers
+//! # topic = "/camera/image"   # in a recording with several topics of images
 //! # every = 5                 # sampling interval, pictures
 //! # angle_step_deg = 15.0     # keyframes by rotation of the view; needs associate = "time"
 //! times = "times.txt"         # optional: lines `time`, `time name` or `name time`
@@ -33,6 +35,9 @@
 //! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC: see the content
 //! truth = "groundtruth.tum"   # optional: for comparison; all keys below apply to both
 //! format = "tum"              # optional, like all below: overrides the detection
+//! topic = "/odom"             # in a recording with several topics of poses
+//! parent = "map"              # in a recording: the frames of reference of a transform
+//! child = "camera"
 //! columns = { tx = "px" }     # CSV: names of columns in the header that are not known
 //! quaternion = "wxyz"         # TUM: or "xyzw"; by default as a comment names it, or "xyzw"
 //! convention = "c2w"          # or "w2c"; the default depends on the format
@@ -100,6 +105,7 @@ mod pose_readings;
 mod pose_validation;
 mod poses_section;
 mod readout;
+mod recorded_parts;
 mod shape_file;
 mod skipped_frame;
 mod straight_axis;
@@ -126,6 +132,7 @@ pub use overlay::{Overlay, OverlayReport};
 pub use picture_group::PictureGroup;
 pub use pose_readings::PoseReading;
 pub use poses_section::PosesSection;
+pub use recorded_parts::{RecordedFrames, RecordedParts};
 pub use shape_file::ShapeFile;
 pub use skipped_frame::SkippedFrame;
 pub use straight_axis::{AXIS_FILE, FoundAxis};

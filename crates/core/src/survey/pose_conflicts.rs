@@ -6,6 +6,7 @@ use crate::frames::FrameFile;
 use std::collections::HashMap;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;
+use tunnelstitch_geometry::recordings::is_recording;
 use tunnelstitch_geometry::trajectory::{Jitter, PoseConflict, PoseEntry, PoseFile};
 
 /// Largest contradiction at a frame, standard deviations of the prior: the pose that is kept may
@@ -98,11 +99,14 @@ pub(super) fn check(
             return Err(SurveyError::Association {
                 path: path.to_owned(),
                 what: format!(
-                    "{}, more than [prior] allows, and frame {} ({}) depends on them; remove the \
-                     wrong line",
-                    of_frame.description(),
+                    "{}, more than [prior] allows, and frame {} ({}) depends on them; {}",
+                    of_frame.description(path),
                     frame.index,
-                    printed(&frame.path)
+                    printed(&frame.path),
+                    match is_recording(path) {
+                        true => "take another topic or transform",
+                        false => "remove the wrong line",
+                    }
                 ),
             });
         }
@@ -115,13 +119,13 @@ pub(super) fn check(
         format!(
             "{}: {}{more}; the first pose of such a time is used",
             printed(path),
-            first.description()
+            first.description(path)
         )
     }))
 }
 
 impl FrameConflict {
-    fn description(&self) -> String {
+    fn description(&self, path: &Path) -> String {
         let PoseConflict {
             time_s,
             lines: [first, second],
@@ -129,8 +133,12 @@ impl FrameConflict {
             angle_deg,
             ..
         } = self.conflict;
+        let unit = match is_recording(path) {
+            true => "in the order of time, messages",
+            false => "lines",
+        };
         format!(
-            "lines {first} and {second} have two poses of {time_s} s, {:.2} mm and \
+            "{unit} {first} and {second} have two poses of {time_s} s, {:.2} mm and \
              {angle_deg:.3}° from each other",
             1e3 * distance * self.unit_m
         )

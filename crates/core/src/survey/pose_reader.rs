@@ -156,10 +156,10 @@ impl<'a> PoseReader<'a> {
             skipped,
             times_s,
         } = self.frames;
-        let default = if file.has_names() {
-            Associate::Name
-        } else {
-            Associate::Order
+        let default = match file.format {
+            PoseFormat::Recording => Associate::Time,
+            _ if file.has_names() => Associate::Name,
+            _ => Associate::Order,
         };
         let (mut gaps, mut conflicts) = (Vec::new(), Vec::new());
         let given = match self.section.associate.unwrap_or(default) {

@@ -4,6 +4,7 @@ use super::associate::Associate;
 use super::missing_poses::MissingPoses;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
+use tunnelstitch_geometry::recordings::{PoseTopic, is_recording};
 use tunnelstitch_geometry::trajectory::{
     CameraAxes, ColumnMap, Direction, DuplicateTimes, PoseFileOptions, PoseFormat, QuaternionOrder,
 };
@@ -21,6 +22,15 @@ pub struct PosesSection {
     /// The files' format.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub format: Option<PoseFormat>,
+    /// The topic of the poses in a recording; by default the only one with poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
+    /// The parent (`frame_id`) of a transform in a recording.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parent: Option<String>,
+    /// The child (`child_frame_id`) of a transform in a recording.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub child: Option<String>,
     /// Names of columns in the headers of CSV files, for columns whose names are not known.
     #[serde(default, skip_serializing_if = "ColumnMap::is_empty")]
     pub columns: ColumnMap,
@@ -47,8 +57,8 @@ pub struct PosesSection {
     /// Length of the file's unit of positions, metres; 1 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit_m: Option<f64>,
-    /// The criterion that associates poses with frames; by default their names, if the file has
-    /// any, else their order.
+    /// The criterion that associates poses with frames; by default their times in a recording,
+    /// their names, if the file has any, else their order.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub associate: Option<Associate>,
     /// Largest difference between the times of a frame and its pose, seconds.
@@ -77,6 +87,12 @@ impl PosesSection {
         }
     }
 
+    /// The criterion that associates poses with frames, if it does not depend on names in the file.
+    pub(super) fn associate(&self) -> Option<Associate> {
+        let of_recording = is_recording(&self.initial).then_some(Associate::Time);
+        self.associate.or(of_recording)
+    }
+
     /// A section with only the path of the initial poses.
     pub fn of(initial: impl Into<PathBuf>) -> Self {
         Self {
@@ -92,6 +108,11 @@ impl PosesSection {
             format: self.format,
             columns: self.columns.clone(),
             quaternion: self.quaternion,
+            recorded: PoseTopic {
+                topic: self.topic.clone(),
+                parent: self.parent.clone(),
+                child: self.child.clone(),
+            },
             duplicate_times: match self.associate {
                 Some(Associate::Time) => DuplicateTimes::Merge,
                 Some(Associate::Order | Associate::Name) | None => DuplicateTimes::Refuse,

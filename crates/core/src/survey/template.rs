@@ -41,12 +41,20 @@ impl Discovery {
                  plants: refine ignores this part of the wall\n";
         text += "\n[camera]\n";
         let _ = match self.calibrations.first() {
-            Some((path, _)) => writeln!(text, "file = {}", quoted(path)),
+            Some((path, _)) => {
+                let parts = self.parts_of(path);
+                let topic = parts.and_then(|parts| parts.calibration.as_ref());
+                let topic = topic.map_or(String::new(), |topic| {
+                    format!("name = {}    # its topic\n", quoted(topic))
+                });
+                write!(text, "file = {}\n{topic}", quoted(path))
+            }
             None => writeln!(
                 text,
                 "# No calibration was found: OpenCV, ROS or Kalibr YAML, COLMAP's cameras.txt or \
                  cameras.bin, nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, \
-                 Meshroom or Metashape, a lens profile of Gyroflow, or our camera.json.\n\
+                 Meshroom or Metashape, a lens profile of Gyroflow, a recording with \
+                 CameraInfo, or our camera.json.\n\
                  file = \"camera.json\""
             ),
         };
@@ -67,15 +75,22 @@ impl Discovery {
     fn write_frames(&self, text: &mut String) {
         let pattern = self.pictures.first();
         let pattern = pattern.map_or("*.jpg", |group| &group.pattern);
-        let _ = match &self.video {
-            Some(video) => writeln!(
+        let _ = match (&self.video, &self.recorded) {
+            (Some(video), _) => writeln!(
                 text,
                 "\n[frames]\nvideo = {}\nevery = {}    # of its pictures; their times are the \
                  video's",
                 quoted(&video.path),
                 video.every
             ),
-            None => writeln!(
+            (None, Some((path, images))) => writeln!(
+                text,
+                "\n[frames]\nbag = {}\ntopic = {}    # times are those of the headers\n\
+                 # every = 5    # takes every fifth",
+                quoted(path),
+                quoted(&images.topic)
+            ),
+            (None, None) => writeln!(
                 text,
                 "\n[frames]\nimages = {}    # sorted by name",
                 quoted(pattern)
@@ -156,7 +171,8 @@ impl Discovery {
         let (count, _) = self.frames();
         let Some((path, poses)) = self.initial() else {
             *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC, OpenSfM, \
-                      Bundler, Meshroom, OpenMVG, Metashape, RealityCapture or Pix4D.\n\
+                      Bundler, Meshroom, OpenMVG, Metashape, RealityCapture, Pix4D or a \
+                      recording.\n\
                       initial = \"baseline.tum\"\n";
             return;
         };
@@ -166,15 +182,26 @@ impl Discovery {
             quoted(path),
             poses.entries.len()
         );
+        if let Some(topic) = self.parts_of(path).and_then(|parts| parts.poses.as_ref()) {
+            let _ = writeln!(text, "topic = {}", quoted(topic));
+        }
         let is_by_time = poses.entries.len() != count || !poses.conflicts.is_empty();
         if is_by_time && poses.has_times() && !poses.has_names() {
             *text += if self.video.is_some() {
                 "associate = \"time\"       # by the video's times, or by [frames] times = FILE\n\
                  interpolate = true\n"
+            } else if self.recorded.is_some() {
+                "associate = \"time\"       # by the times of the recording\n\
+                 interpolate = true\n"
             } else {
                 "associate = \"time\"       # by the frames' names, or by [frames] times = FILE\n\
                  # interpolate = true\n"
             };
+        }
+        if poses.format == PoseFormat::Recording {
+            *text += "# If these are the robot's poses, and not the camera's: how the camera is \
+                      mounted (a 4 × 4 matrix).\n\
+                      # body_to_camera = \"mount.txt\"\n";
         }
         if poses.format == PoseFormat::Euroc {
             *text += "# These are a body's poses: how the camera is mounted (its sensor.yaml, or a \

@@ -33,6 +33,8 @@ pub enum PoseFormat {
     Realitycapture,
     /// Pix4D's calibrated external camera parameters; read only.
     Pix4d,
+    /// Messages of a recording (MCAP, ROS 1 bag); read only.
+    Recording,
 }
 
 impl PoseFormat {
@@ -56,10 +58,14 @@ impl PoseFormat {
         }
     }
 
-    /// True for the programs of structure from motion, whose world has its origin and axes anywhere
-    /// unless the user has placed it.
+    /// True for the programs of structure from motion and for robots, whose world has its origin
+    /// and axes anywhere unless the user has placed it.
     pub fn has_arbitrary_world(self) -> bool {
-        self.has_no_scale() || matches!(self, Self::Metashape | Self::Realitycapture | Self::Pix4d)
+        self.has_no_scale()
+            || matches!(
+                self,
+                Self::Metashape | Self::Realitycapture | Self::Pix4d | Self::Recording
+            )
     }
 
     /// True for the programs of structure from motion whose unit of length is arbitrary unless the

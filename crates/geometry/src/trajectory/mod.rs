@@ -16,6 +16,7 @@
 //! | `metashape` (read only) | camera-to-world, OpenCV's axes | | yes |
 //! | `realitycapture` (read only) | camera-to-world, OpenGL's axes | | yes |
 //! | `pix4d` (read only) | camera-to-world, OpenGL's axes | | yes |
+//! | `recorded` (read only) | child-to-parent, as OpenCV's camera-to-world | seconds | |
 //!
 //! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
 //! poses to the tunnel's frame.
@@ -63,6 +64,7 @@ mod pose_file;
 mod pose_options;
 mod quaternion_order;
 mod realitycapture;
+mod recorded;
 mod rigid;
 mod row;
 pub mod se3;

@@ -10,8 +10,9 @@ use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
 use super::{
     bundler, colmap, colmap_binary, csv, euroc, kitti, meshroom, metashape, nerfstudio, openmvg,
-    opensfm, pix4d, realitycapture, text, tum,
+    opensfm, pix4d, realitycapture, recorded, text, tum,
 };
+use crate::recordings::is_recording;
 use std::path::{Path, PathBuf};
 
 /// A file of poses, in its own convention, with at least one pose. Times, if present, increase;
@@ -65,7 +66,8 @@ pub fn read_poses(path: &Path, format: Option<PoseFormat>) -> Result<PoseFile, P
 }
 
 /// Reads a file of poses with options. A folder is a COLMAP model, and so is a file whose name ends
-/// in `.bin`.
+/// in `.bin`; a recording is one whose name ends in `.mcap` or
+/// `.bag`.
 ///
 /// # Errors
 /// Those of [`read_poses`]; a column that `options` names and the file has not.
@@ -78,6 +80,10 @@ pub fn read_poses_with(path: &Path, options: &PoseFileOptions) -> Result<PoseFil
     let (format, parsed) = match options.format {
         None | Some(PoseFormat::Colmap) if colmap_binary::is_binary(&path) => {
             (PoseFormat::Colmap, colmap_binary::read(&path)?.into())
+        }
+        None | Some(PoseFormat::Recording) if is_recording(&path) => {
+            let parsed = recorded::read(&path, &options.recorded)?;
+            (PoseFormat::Recording, parsed)
         }
         _ => read_text(&path, options)?,
     };
@@ -133,6 +139,12 @@ fn read_text(
         PoseFormat::Metashape => metashape::parse(path, &text)?.into(),
         PoseFormat::Realitycapture => realitycapture::parse(path, &text)?.into(),
         PoseFormat::Pix4d => pix4d::parse(path, &text)?.into(),
+        PoseFormat::Recording => {
+            return Err(PoseError::file(
+                path,
+                "is no recording, whose name ends in .mcap or .bag",
+            ));
+        }
     };
     Ok((format, parsed))
 }

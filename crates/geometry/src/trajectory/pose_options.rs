@@ -4,6 +4,7 @@ use super::csv::ColumnMap;
 use super::entry_list::DuplicateTimes;
 use super::format::PoseFormat;
 use super::quaternion_order::QuaternionOrder;
+use crate::recordings::PoseTopic;
 
 /// Options for reading a pose file. Those that do not concern its format have no effect.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,6 +16,8 @@ pub struct PoseFileOptions {
     /// TUM: the order of the quaternion's numbers; by default the one that a comment names, or
     /// TUM's own.
     pub quaternion: Option<QuaternionOrder>,
+    /// Recordings: the topic.
+    pub recorded: PoseTopic,
     /// The handling of a time that two poses share.
     pub duplicate_times: DuplicateTimes,
 }

@@ -71,7 +71,7 @@ impl PictureCache {
 
     fn has_compressed_files(&self) -> bool {
         let bytes = |file: &FrameFile| {
-            if file.is_in_video() {
+            if file.shared_file().is_some() {
                 0
             } else {
                 std::fs::metadata(&file.path).map_or(0, |file| file.len())

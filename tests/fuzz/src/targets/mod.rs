@@ -15,6 +15,7 @@ pub mod names;
 pub mod pictures;
 pub mod plan;
 pub mod poses;
+pub mod recordings;
 pub mod refinement;
 pub mod requests;
 pub mod runs;
@@ -27,7 +28,7 @@ pub mod words;
 pub type Target = fn(&[u8]);
 
 /// All targets by their names.
-pub const TARGETS: [(&str, Target); 21] = [
+pub const TARGETS: [(&str, Target); 22] = [
     ("calibration", calibration::run),
     ("centreline", centreline::run),
     ("checkpoint", checkpoint::run),
@@ -42,6 +43,7 @@ pub const TARGETS: [(&str, Target); 21] = [
     ("pictures", pictures::run),
     ("plan", plan::run),
     ("poses", poses::run),
+    ("recordings", recordings::run),
     ("refinement", refinement::run),
     ("requests", requests::run),
     ("runs", runs::run),

@@ -19,6 +19,7 @@
 //! | Metashape | `.xml` with a `chunk` | `frame`, `fisheye` | (½, ½) |
 //! | Basalt | `.json` with `value0` | `pinhole`, `ds`, `eucm`, `ucm`, `kb4`, `fov` | (0, 0) |
 //! | Gyroflow | `.json` with `fisheye_params` and `calib_dimension` | `opencv_fisheye`, `opencv_standard` | (0, 0) |
+//! | recording | `.mcap`, `.bag` | `plumb_bob`, `rational_polynomial`, `equidistant` of its CameraInfo | (0, 0) |
 //! | nerfstudio, instant-ngp | `.json` with `fl_x`, `camera_angle_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
 
 mod basalt;
@@ -41,6 +42,7 @@ mod opencv;
 mod openmvg;
 mod opensfm;
 mod read;
+mod recorded;
 mod selection;
 #[cfg(test)]
 mod tests;

@@ -4,11 +4,12 @@ use super::error::{CalibrationError, ParseError};
 use super::unknown::unknown_calibration;
 use super::{
     basalt, camodocal, colmap, colmap_binary, gyroflow, kalibr, meshroom, metashape, native,
-    nerfstudio, ocamcalib, opencv, openmvg, opensfm, value_tree,
+    nerfstudio, ocamcalib, opencv, openmvg, opensfm, recorded, value_tree,
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
 use crate::files::{BinaryFile, read_regular};
+use crate::recordings::is_recording;
 use std::path::Path;
 
 /// Smallest width and height of an image, pixels.
@@ -20,7 +21,8 @@ const FOCAL_SIDES: [f64; 2] = [0.05, 100.0];
 const MIN_VISIBLE_FRACTION: f64 = 0.5;
 
 /// Reads a calibration file of any supported format (see the table in the module's documentation).
-/// `name` selects the camera if the file holds several (`cam1`, a COLMAP id).
+/// `name` selects the camera if the file holds several (`cam1`, a COLMAP id, the topic of a
+/// recording).
 ///
 /// # Errors
 /// An unreadable file; an unknown, missing or impossible entry, with its line where it is known; a
@@ -40,6 +42,10 @@ pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, Calib
     if extension == "bin" {
         let mut file = BinaryFile::open(path).map_err(unreadable)?;
         let camera = colmap_binary::read(&mut file, name);
+        return camera.and_then(validate).map_err(content);
+    }
+    if is_recording(path) {
+        let camera = recorded::camera(&recorded::read_info(path, name)?);
         return camera.and_then(validate).map_err(content);
     }
     let bytes = read_regular(path, MAX_CALIBRATION_BYTES).map_err(unreadable)?;
