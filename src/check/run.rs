@@ -149,6 +149,29 @@ mod tests {
         assert!(said.contains("dark"), "{said}");
     }
 
+    /// The wall's shape shows only where turns see it from both sides.
+    #[test]
+    fn deformation_is_measurable_where_turns_overlap() {
+        let near = checked(small()).deformation.unwrap();
+        assert!(near.node_sigma_mm < 0.2 * near.prior_sigma_mm, "{near:?}");
+        // Ovality is one figure of the whole survey.
+        assert!(near.harmonic_sigma_mm[0] < near.node_sigma_mm, "{near:?}");
+        assert!(near.warning().is_none());
+        let far = checked(SimulateOptions {
+            advance_m: 0.3,
+            ..small()
+        });
+        let deformation = far.deformation.unwrap();
+        assert!(
+            deformation.node_sigma_mm > 2.0 * near.node_sigma_mm,
+            "{deformation:?} {near:?}"
+        );
+        let closer = deformation.half_advance_sigma_mm.unwrap();
+        assert!(closer < 0.7 * deformation.node_sigma_mm, "{deformation:?}");
+        let said = far.warnings.join("\n");
+        assert!(said.contains("half the advance per turn"), "{said}");
+    }
+
     /// A masked shaft and ignored parts of the wall reduce the overlap.
     #[test]
     fn masked_and_ignored_parts_do_not_overlap() {

@@ -38,3 +38,37 @@ impl AssumedTexture {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::photometric_problem::PhotometricProblem;
+    use crate::problem::test_ring::Ring;
+    use tunnelstitch_geometry::surface::Surface;
+
+    /// Frames of a wall have the information of a texture with its slopes.
+    #[test]
+    fn information_is_that_of_sampled_texture_with_equal_slopes() {
+        let ring = Ring::new(0.0);
+        // Of `waves` on a perimeter of 6π m, along s and h: a wave of amplitude a has a/√2.
+        let along_s = (50.0f64 * 20.0 / 3.0).hypot(30.0 * 4.0 / 3.0);
+        let along_h = (50.0f64 * 3.0).hypot(30.0 * 13.0);
+        assert!((ring.wall.circle.perimeter_m() - 6.0 * std::f64::consts::PI).abs() < 1e-9);
+        let texture = AssumedTexture {
+            slope_grey_per_m: 0.5 * along_s.hypot(along_h),
+            noise_grey: 1.0,
+        };
+        let information = |problem: &PhotometricProblem| -> f64 {
+            let at = problem.linearise(&ring.estimates).unwrap();
+            let of_pose = |k: usize| {
+                let index = problem.pattern().block_index(k, k).unwrap();
+                at.normal.blocks[index].fixed_view::<6, 6>(0, 0).trace()
+            };
+            (1..ring.estimates.len()).map(of_pose).sum()
+        };
+        let sampled = information(&ring.problem().with_known_noise(1.0));
+        let assumed = information(&ring.problem().with_assumed_texture(texture));
+        let ratio = assumed / sampled;
+        assert!((0.8..1.25).contains(&ratio), "{ratio}");
+    }
+}
