@@ -213,7 +213,15 @@ pub mod visibility {
     /// the tiles that are compared, and of the points of the reference mosaic.
     ///
     /// Higher: more oblique or distant wall is excluded. Chosen by: unknown.
-    pub const MIN_RELATIVE_SAMPLE_AREA: f64 = 0.05;
+    pub const MIN_RELATIVE_SAMPLE_AREA: f64 = 0.15;
+
+    /// Least area of a tile's sample in a frame over that in the frame that sees it best. What a
+    /// frame resolves less is blurred against the others, and their differences are no noise.
+    ///
+    /// Higher: frames that see the wall from far along the tunnel are compared with fewer others.
+    ///
+    /// Chosen by: a camera that looks along the tunnel, whose residuals fall as it rises to 0.25.
+    pub const MIN_RELATIVE_SHARPNESS: f32 = 0.25;
 }
 
 /// Thresholds of `samples/outlier_mask.rs`.

@@ -12,9 +12,9 @@ use tunnelstitch_geometry::trajectory::Pose;
 /// section's perimeter.
 ///
 /// At an angle φ to the section `cos³ φ` of the pixels are left: the share
-/// [`crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA`] at `tan φ = √(0.05^(−2/3) − 1)` =
-/// 2.5, where the wall is `1/cos φ` away.
-pub const RESOLVED_RANGE_RADII: f64 = 2.7;
+/// [`crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA`] at `tan φ = √(0.15^(−2/3) − 1)` =
+/// 1.6, where the wall is `1/cos φ` away.
+pub const RESOLVED_RANGE_RADII: f64 = 1.9;
 
 /// Footprint of frame `frame` at `pose`, taken by `camera`.
 ///

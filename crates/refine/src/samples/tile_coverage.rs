@@ -176,11 +176,12 @@ impl<'a> TileCoverage<'a> {
     fn find(&self, stretch: usize) -> Result<(Visibility, usize), FrameError> {
         let Stretch { rows, frames } = &self.stretches[stretch];
         let posed: Vec<PosedFrame> = frames.iter().filter_map(|k| self.posed[*k]).collect();
+        let light = self.images.frames.camera_light();
         let all = Visibility::find(
             self.surface.as_ref(),
             &self.grid,
             &self.camera,
-            self.images.frames.shading().as_ref(),
+            light.as_deref(),
             &self.exclusions,
             &posed,
             rows,

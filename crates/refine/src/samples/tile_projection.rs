@@ -4,7 +4,7 @@ use crate::samples::observer::Observer;
 use crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA;
 use crate::tiles::grid::{SIDE, WallGrid};
 use nalgebra::{Vector2, Vector3};
-use tunnelstitch_core::frames::{PyramidMask, Shading};
+use tunnelstitch_core::frames::{CameraLight, PyramidMask};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::trajectory::Pose;
 
@@ -61,11 +61,18 @@ pub fn project_tile(
 }
 
 impl TileProjection {
-    /// Frame `frame` as an observer of the tile.
-    pub fn observer(&self, frame: usize, camera: &Camera, shading: Option<&Shading>) -> Observer {
-        let shade = shading.map_or(1.0, |shading| shading.at_level(&self.centre, camera));
+    /// A frame, the one of index `k` among those of the visibility and of `index` in the survey, as
+    /// an observer of the tile.
+    pub fn observer(
+        &self,
+        k: usize,
+        index: usize,
+        camera: &Camera,
+        light: Option<&CameraLight>,
+    ) -> Observer {
+        let shade = light.map_or(1.0, |light| light.at_level(index, &self.centre, camera));
         Observer {
-            frame: frame as u32,
+            frame: k as u32,
             pixels: self.pixels as f32,
             shade: shade as f32,
         }

@@ -88,7 +88,7 @@ pub fn run<'a>(
         estimation.hidden_bands =
             find_hidden_bands(&masked, context.nominal.as_ref(), &setup.hidden_bands);
     }
-    if has_solve_ahead(state) && setup.frames.shading().is_some() {
+    if has_solve_ahead(state) && setup.frames.camera_light().is_some() {
         correct_once(&context, setup.options, &state.frames)?;
     }
     // The assessment uses the last one only.

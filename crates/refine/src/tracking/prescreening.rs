@@ -4,12 +4,14 @@
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
+use crate::samples::footprints::RESOLVED_RANGE_RADII;
 use crate::thresholds::correlation_search::MIN_OVERLAP_SHARE;
 use crate::thresholds::prescreening::{MAX_REPEAT_DIFFERENCE_GREY, MIN_CONTRAST_GREY};
 use tunnelstitch_core::frames::{GreyImage, Shading, noise_sigma};
 use tunnelstitch_core::progress::Progress;
+use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-use tunnelstitch_geometry::surface::viewing_distance;
+use tunnelstitch_geometry::surface::{mean_radius_m, sighted_wall, viewing_distance};
 
 /// Frames decoded at once: bounds the memory.
 const BATCH: usize = 64;
@@ -67,8 +69,10 @@ pub fn prescreen(
             });
             if rejections[k].is_none() {
                 noises.extend(noise);
-                for (sum, value) in sums.iter_mut().zip(picture.data()) {
-                    if !value.is_nan() {
+                let shows_wall = resolved_pixels(context, k, coarsest);
+                let values = picture.data().iter().zip(shows_wall);
+                for (sum, (value, shows_wall)) in sums.iter_mut().zip(values) {
+                    if shows_wall && !value.is_nan() {
                         sum[0] += f64::from(*value) / mean;
                         sum[1] += 1.0;
                     }
@@ -78,19 +82,9 @@ pub fn prescreen(
         }
     }
     progress.finish();
-    // A hundred times the relative brightness: grey levels of an ordinary picture. Outside the
-    // lens's field of view there is nothing.
-    let camera = context.camera.at_level(coarsest);
-    let mean = sums.iter().enumerate().map(|(k, [sum, n])| {
-        let is_shown = camera
-            .ray((k % size.0) as f64, (k / size.0) as f64)
-            .is_some();
-        if is_shown {
-            (100.0 * sum / n) as f32
-        } else {
-            f32::NAN
-        }
-    });
+    // A hundred times the relative brightness: grey levels of an ordinary picture. Where no frame
+    // shows wall there is nothing.
+    let mean = sums.iter().map(|[sum, n]| (100.0 * sum / n) as f32);
     let mean = GreyImage::new(size.0, size.1, mean.collect());
     let full = (
         context.camera.width as usize,
@@ -104,6 +98,26 @@ pub fn prescreen(
         rejections,
         shading: has_enough.then(|| Shading::of_mean(&mean, full)).flatten(),
     })
+}
+
+/// The pixels of a frame at a pyramid level that show wall near enough to be compared, at the
+/// frame's initial pose; row by row.
+fn resolved_pixels(context: &EstimationContext, frame: usize, level: usize) -> Vec<bool> {
+    let surface = context.surface.as_ref();
+    let camera = context.camera.at_level(level);
+    let camera = Camera {
+        max_range_m: (camera.max_range_m).min(RESOLVED_RANGE_RADII * mean_radius_m(surface)),
+        ..camera
+    };
+    let pose = &context.prior.initial[frame];
+    let width = camera.width as usize;
+    let shows_wall = |k: usize| {
+        let ray = camera.ray((k % width) as f64, (k / width) as f64);
+        ray.is_some_and(|ray| sighted_wall(surface, &camera, pose, &ray).is_ok())
+    };
+    (0..width * camera.height as usize)
+        .map(shows_wall)
+        .collect()
 }
 
 /// Mean and standard deviation of a picture, grey levels, and its share of pixels with a value.

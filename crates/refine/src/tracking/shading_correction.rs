@@ -20,7 +20,11 @@ use crate::solver::neighbourhood::Neighbourhood;
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use nalgebra::Vector2;
 use std::ops::Range;
-use tunnelstitch_core::frames::{Light, Shading};
+use std::sync::Arc;
+use tunnelstitch_core::frames::{CameraLight, Falloff, Lamp, Light, Shading};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::mean_radius_m;
+use tunnelstitch_geometry::trajectory::Pose;
 use tunnelstitch_photometry::{Observation, PhotometricCalibration, Priors};
 
 /// Frames that the shading is estimated from, at the most: it is the same in all.
@@ -34,8 +38,8 @@ const MIN_SIGNIFICANCE_SIGMA: f64 = 3.0;
 /// 55.5/27.
 const MIN_CHANGE_SIGNIFICANCE_SIGMA: f64 = 1.43;
 
-/// Corrects the shading until frames agree where they overlap, solving for their poses in between;
-/// returns the pixels at which wall was observed last.
+/// Corrects the light until frames agree where they overlap, solving for their poses in between;
+/// returns frames and pixels at which wall was observed last.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -43,22 +47,24 @@ pub fn correct_until_settled(
     context: &EstimationContext,
     options: &RefineOptions,
     frames: &mut FrameStates,
-) -> Result<Vec<Vector2<f64>>, ProblemError> {
+) -> Result<Vec<(usize, Vector2<f64>)>, ProblemError> {
     let side = context.camera.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
-    let mut pixels = Vec::new();
+    let mut observed = Vec::new();
     for _ in 0..MAX_TRACKING_ITERATIONS {
+        let first = calibrated_frames(frames.estimates.len()).start;
         let points = observe_tiles(context, options, frames)?;
-        pixels = points.iter().flatten().map(Observation::pixel).collect();
-        if !correct(context, &points, frames.estimates.len()) {
+        let pixels = points.iter().flatten();
+        observed = pixels.map(|one| (first + one.frame, one.pixel())).collect();
+        if !correct(context, &points, frames) {
             break;
         }
         Neighbourhood::of_all(frames).solve(context, options, finest..=coarsest, frames)?;
     }
-    Ok(pixels)
+    Ok(observed)
 }
 
-/// Corrects the shading by what overlapping frames show at their present poses, if something
+/// Corrects the light by what overlapping frames show at their present poses, if something
 /// significant is wrong with it.
 ///
 /// # Errors
@@ -69,39 +75,92 @@ pub fn correct_once(
     frames: &FrameStates,
 ) -> Result<(), ProblemError> {
     let points = observe_tiles(context, options, frames)?;
-    correct(context, &points, frames.estimates.len());
+    correct(context, &points, frames);
     Ok(())
 }
 
-/// The frames that the shading is estimated from, of `count`: the middle ones.
+/// The frames that the light is estimated from, of `count`: the middle ones.
 fn calibrated_frames(count: usize) -> Range<usize> {
     let first = count.saturating_sub(MAX_SHADING_FRAMES) / 2;
     first..(first + MAX_SHADING_FRAMES).min(count)
 }
 
-/// Corrects the shading by what overlapping frames of `count` show of wall `points`; false if
-/// nothing significant is wrong with it.
-fn correct(context: &EstimationContext, points: &[Vec<Observation>], count: usize) -> bool {
+/// The lamp of a light; one without strength if it has none.
+fn lamp_of(context: &EstimationContext, light: &Light) -> Lamp {
+    let known = match light {
+        Light::Shaded(light) => light.lamp.as_ref().map(|(lamp, _)| *lamp),
+        Light::Even | Light::Normalised => None,
+    };
+    known.unwrap_or(Lamp::none(mean_radius_m(context.surface.as_ref())))
+}
+
+/// Corrects the light by what overlapping frames show of wall `points`; false if nothing
+/// significant is wrong with it.
+///
+/// There is a lamp if frames agree significantly better with one. Its light over a frame is that of
+/// the frame's present pose.
+fn correct(context: &EstimationContext, points: &[Vec<Observation>], frames: &FrameStates) -> bool {
     let size = (
         context.camera.width as usize,
         context.camera.height as usize,
     );
-    let (before, sigmas) = match context.frames.light() {
-        Light::Shaded(shading) => (*shading, MIN_CHANGE_SIGNIFICANCE_SIGMA),
-        Light::Even => (Shading::none(size), MIN_SIGNIFICANCE_SIGMA),
+    let light = context.frames.light();
+    let lamp = lamp_of(context, &light);
+    let (before, sigmas) = match light {
+        Light::Shaded(before) => (before, MIN_CHANGE_SIGNIFICANCE_SIGMA),
+        Light::Even => {
+            let none = CameraLight::common(Shading::none(size));
+            (Arc::new(none), MIN_SIGNIFICANCE_SIGMA)
+        }
         Light::Normalised => return false,
     };
-    let frames = calibrated_frames(count).len();
-    let found = PhotometricCalibration::solve(points, frames, &before, &Priors::default());
-    let Some(found) = found.filter(|found| found.is_shading_significant(sigmas)) else {
+    let count = calibrated_frames(frames.estimates.len()).len();
+    let solve = |points: &[Vec<Observation>], lamp: Option<&Lamp>| {
+        PhotometricCalibration::solve(points, count, &before.shading, lamp, &Priors::default())
+    };
+    let with_lamp = solve(points, Some(&lamp)).filter(|found| {
+        before.lamp.is_some() || found.is_lamp_significant(&lamp, MIN_SIGNIFICANCE_SIGMA)
+    });
+    let is_lamp = with_lamp.is_some();
+    let found = with_lamp.or_else(|| {
+        let dark = |point: &Vec<Observation>| point.iter().map(Observation::without_lamp).collect();
+        let dark: Vec<Vec<Observation>> = points.iter().map(dark).collect();
+        solve(&dark, None)
+    });
+    let Some(found) = found else {
         return false;
     };
-    let shading = before.changed(&found.shading);
-    context.frames.set_light(Light::Shaded(Box::new(shading)));
-    true
+    let is_changed = found.is_light_significant(sigmas, is_lamp);
+    eprintln!("correct: lamp {is_lamp} changed {is_changed} lamp before {:?} delta {:?} n {}", lamp.unknowns(), found.lamp, points.len());
+    let (shading, lamp) = match is_changed {
+        true => (
+            before.shading.changed(&found.shading),
+            lamp.changed(&found.lamp),
+        ),
+        false => (before.shading.clone(), lamp),
+    };
+    if is_changed || is_lamp {
+        let light = CameraLight {
+            shading,
+            lamp: is_lamp.then(|| (lamp, falloffs(context, &lamp, frames))),
+        };
+        context.frames.set_light(Light::Shaded(Arc::new(light)));
+    }
+    is_changed
 }
 
-/// Observes tiles spread over all of the wall by the frames that the shading is estimated from, at
+/// The falloff of a lamp over every frame: at its present pose, or, if it has none yet, at its
+/// initial one.
+fn falloffs(context: &EstimationContext, lamp: &Lamp, frames: &FrameStates) -> Vec<Falloff> {
+    let initial = context.prior.initial.iter().enumerate();
+    let poses: Vec<Pose> = initial
+        .map(|(k, initial)| frames.estimates.get(k).map_or(*initial, |known| known.pose))
+        .collect();
+    let surface = context.surface.as_ref();
+    poses.par_map(|pose| Falloff::new(lamp, surface, &context.camera, pose))
+}
+
+/// Observes tiles spread over all of the wall by the frames that the light is estimated from, at
 /// their present poses, tile by tile; frames are counted from the first of these.
 fn observe_tiles(
     context: &EstimationContext,
@@ -112,20 +171,21 @@ fn observe_tiles(
     let level = options.handover_level(context.camera.shorter_side());
     let window = frames.window_of(range.clone(), range.clone());
     let problem = PhotometricProblem::new(context, Sampling::of(level), window)?;
+    let lamp = lamp_of(context, &context.frames.light());
     let tiles = problem.gather_from_tiles(
         MAX_SHADING_TILES,
         |tiles: &mut Vec<Vec<Observation>>, tile| {
             let means = tile.workspace.mean_values(tile.points, tile.observations());
+            let (x_w, normal) = (&tile.points.centre.x_w, tile.points.centre.normal());
             let seen = tile.observers.iter().zip(means);
             let observations = seen.filter_map(|(observer, mean)| {
                 let frame = tile.participants[observer.frame as usize];
                 let pose = &frames.estimates[range.start + frame].pose;
-                let pixel = problem
-                    .camera_of(frame)
-                    .project(&pose.to_camera(&tile.points.centre.x_w))?;
+                let pixel = problem.camera_of(frame).project(&pose.to_camera(x_w))?;
                 let factor = tile.sampled_frames[observer.frame as usize].gain() * observer.shade;
                 let pixel = [pixel.x as f32, pixel.y as f32];
-                Observation::new(frame, pixel, mean as f32, factor)
+                let seen = Observation::new(frame, pixel, mean as f32, factor)?;
+                Some(seen.with_lamp(lamp.terms(pose, x_w, &normal)))
             });
             let observations: Vec<Observation> = observations.collect();
             if observations.len() > 1 {
@@ -163,11 +223,11 @@ mod tests {
         let context = test_context(&wall, &frames, &prior);
         let states = frame_states(&wall.poses);
         let points = observe_tiles(&context, &RefineOptions::default(), &states).unwrap();
-        let any = correct(&context, &points, states.estimates.len());
-        assert_eq!(any, frames.shading().is_some());
-        let shading = frames.shading()?;
+        let any = correct(&context, &points, &states);
+        assert_eq!(any, frames.camera_light().is_some());
+        let light = frames.camera_light()?;
         let (w, h) = (f64::from(wall.camera.width), f64::from(wall.camera.height));
-        Some(move |u, v| shading.at(&Vector2::new(u * w, v * h)))
+        Some(move |u, v| light.log_at(0, &Vector2::new(u * w, v * h)).exp())
     }
 
     #[test]
