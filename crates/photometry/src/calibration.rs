@@ -1,11 +1,11 @@
 //! Robust solution of the photometric calibration.
 
-use super::normal_equations::{NormalEquations, ShadingMatrix, Solution};
-use super::observation::{LinearisedPoint, Observation, Unknowns};
+use super::normal_equations::{LightMatrix, NormalEquations, Solution};
+use super::observation::{LIGHT_TERMS, LinearisedPoint, Observation, Unknowns};
 use super::priors::Priors;
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
-use tunnelstitch_core::frames::{SHADING_TERMS, Shading};
+use tunnelstitch_core::frames::{LAMP_TERMS, Lamp, SHADING_TERMS, Shading};
 use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 
 /// Reweighting iterations at the most: it takes ten until glints weigh nothing, and three leave the
@@ -20,7 +20,7 @@ const MIN_VARIANCE_GREY2: f64 = 1e-6;
 /// on the number of threads.
 const PARTS: usize = 16;
 
-/// Corrections of the known gains, biases and shading.
+/// Corrections of the known gains, biases, shading and lamp.
 #[derive(Clone, Debug)]
 pub struct PhotometricCalibration {
     /// `α_i`: logarithms of the frames' gains.
@@ -29,13 +29,17 @@ pub struct PhotometricCalibration {
     pub biases: Vec<f64>,
     /// `c_k`: coefficients of the logarithmic shading.
     pub shading: [f64; SHADING_TERMS],
-    /// Covariance C of `c_k`.
-    pub shading_covariance: ShadingMatrix,
+    /// Changes of the lamp's unknowns; zero without a lamp.
+    pub lamp: [f64; LAMP_TERMS],
+    /// Variance of the residuals, grey levels².
+    pub variance: f64,
+    /// Covariance C of the light's unknowns: `c_k`, then the lamp's.
+    covariance: LightMatrix,
 }
 
 impl PhotometricCalibration {
-    /// Calibrates `frames` frames of the size of `known`, the shading that is known already, by
-    /// their observations of wall `points`; `None` if no point is observed twice or the normal
+    /// Calibrates `frames` frames of the size of `known`, the shading that is known already beside
+    /// the `lamp`, by their observations of wall `points`; `None` if no point is observed twice or the normal
     /// matrix is not positive definite.
     ///
     /// The prior holds for all of the shading, what is known included. Noise is independent from
@@ -50,9 +54,15 @@ impl PhotometricCalibration {
         points: &[Vec<Observation>],
         frames: usize,
         known: &Shading,
+        lamp: Option<&Lamp>,
         priors: &Priors,
     ) -> Option<Self> {
         let size = known.size();
+        let lamp = lamp.map_or([0.0; LAMP_TERMS], Lamp::unknowns);
+        let known = std::array::from_fn(|k| match k.checked_sub(SHADING_TERMS) {
+            Some(term) => lamp[term],
+            None => known.coefficients()[k],
+        });
         let mut x = Unknowns::zeros(frames);
         let mut variance = f64::INFINITY;
         let mut solution = None;
@@ -64,9 +74,10 @@ impl PhotometricCalibration {
             let weight = (sums.sizes.len() as f64 / independent).max(1.0);
             let priors = Priors {
                 shading_sigma: priors.shading_sigma / weight.sqrt(),
+                lamp_sigma: priors.lamp_sigma / weight.sqrt(),
                 ..*priors
             };
-            let solved = sums.normal.solve(&priors, variance, known.coefficients())?;
+            let solved = sums.normal.solve(&priors, variance, &known)?;
             x.clone_from(&solved.x);
             solution = Some(solved);
             if (variance - before).abs() < SETTLED_VARIANCE_CHANGE * variance {
@@ -77,28 +88,46 @@ impl PhotometricCalibration {
     }
 
     fn new(solution: &Solution, variance: f64) -> Self {
-        let Unknowns { frames, shading } = &solution.x;
+        let Unknowns { frames, light } = &solution.x;
         Self {
             log_gains: frames.iter().map(|[log_gain, _]| *log_gain).collect(),
             biases: frames.iter().map(|[_, bias]| *bias).collect(),
-            shading: *shading,
-            shading_covariance: variance * solution.shading_cofactors(),
+            shading: std::array::from_fn(|k| light[k]),
+            lamp: std::array::from_fn(|k| light[SHADING_TERMS + k]),
+            variance,
+            covariance: variance * solution.light_cofactors(),
         }
     }
 
-    /// True if the shading is more than `sigmas` times as large as noise alone makes it:
-    /// `cᵀ C⁻¹ c > sigmas² K` with K coefficients, for noise alone `χ²` with a mean of K.
+    /// True if the light is changed by more than `sigmas` times as much as noise alone changes it:
+    /// `cᵀ C⁻¹ c > sigmas² K` with K unknowns, for noise alone `χ²` with a mean of K; the lamp's
+    /// unknowns count where there `is_lamp`.
     ///
     /// Each direction counts by its own accuracy. A shading as a common bias behind a lamp makes it
     /// is hardly determined, and must not hide errors of one that is.
-    pub fn is_shading_significant(&self, sigmas: f64) -> bool {
-        let c = SVector::from(self.shading);
-        let square = self
-            .shading_covariance
-            .cholesky()
-            .map(|factor| c.dot(&factor.solve(&c)));
-        square.is_some_and(|square| square > sigmas * sigmas * SHADING_TERMS as f64)
+    pub fn is_light_significant(&self, sigmas: f64, is_lamp: bool) -> bool {
+        if is_lamp {
+            let [shading, lamp] = [&self.shading[..], &self.lamp[..]];
+            let all = SVector::from_iterator(shading.iter().chain(lamp).copied());
+            is_significant::<LIGHT_TERMS>(&all, &self.covariance, sigmas)
+        } else {
+            let shading = SVector::from(self.shading);
+            let covariance = self
+                .covariance
+                .fixed_view::<SHADING_TERMS, SHADING_TERMS>(0, 0);
+            is_significant(&shading, &covariance.into_owned(), sigmas)
+        }
     }
+}
+
+/// True if `xᵀ C⁻¹ x > sigmas² K`.
+fn is_significant<const K: usize>(
+    x: &SVector<f64, K>,
+    covariance: &SMatrix<f64, K, K>,
+    sigmas: f64,
+) -> bool {
+    let square = covariance.cholesky().map(|factor| x.dot(&factor.solve(x)));
+    square.is_some_and(|square| square > sigmas * sigmas * K as f64)
 }
 
 /// Normal equations and residuals of some wall points.
@@ -158,7 +187,7 @@ mod tests {
     use nalgebra::Vector2;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
-    use tunnelstitch_core::frames::{Shading, shading_terms};
+    use tunnelstitch_core::frames::{CameraLight, Shading, shading_terms};
 
     const FRAMES: usize = 8;
     const SIZE: (usize, usize) = (64, 48);
@@ -166,6 +195,7 @@ mod tests {
         log_gain_sigma: 0.3,
         bias_sigma_grey: 10.0,
         shading_sigma: 0.5,
+        lamp_sigma: 0.5,
     };
 
     /// Frames of a wall with a known truth.
@@ -199,7 +229,7 @@ mod tests {
                     let frame = (point + k) % FRAMES;
                     let pixel = [63.0 * u, 47.0 * v];
                     let terms = shading_terms(&Vector2::from(pixel), SIZE);
-                    let shading = terms.iter().zip(&self.truth.shading);
+                    let shading = terms.iter().zip(&self.truth.light);
                     let light: f64 = shading.map(|(t, c)| t * c).sum();
                     let [log_gain, bias] = self.truth.frames[frame];
                     let factor = (self.known)(u, v);
@@ -221,7 +251,8 @@ mod tests {
 
         fn solve(&self, count: usize, rng: &mut ChaCha8Rng) -> PhotometricCalibration {
             let points = self.points(count, rng);
-            PhotometricCalibration::solve(&points, FRAMES, &Shading::none(SIZE), &PRIORS).unwrap()
+            PhotometricCalibration::solve(&points, FRAMES, &Shading::none(SIZE), None, &PRIORS)
+                .unwrap()
         }
     }
 
@@ -229,9 +260,9 @@ mod tests {
         let none = Shading::none(SIZE);
         let place = |k: usize, steps: usize, of: usize| (k * (of - 1)) as f64 / steps as f64;
         let pixels = (0..25 * 33)
-            .map(|k| nalgebra::Vector2::new(place(k % 33, 32, SIZE.0), place(k / 33, 24, SIZE.1)));
-        none.changed(found)
-            .relative_difference(&none.changed(truth), pixels)
+            .map(|k| Vector2::new(place(k % 33, 32, SIZE.0), place(k / 33, 24, SIZE.1)));
+        let light = |coefficients| CameraLight::common(none.changed(coefficients));
+        light(found).relative_difference(&light(truth), pixels.map(|pixel| (0, pixel)))
     }
 
     #[test]
@@ -244,7 +275,8 @@ mod tests {
         for (k, own) in simulated.truth.frames.iter_mut().enumerate() {
             *own = [0.2 * (1.7 * k as f64).sin(), 3.0 * (2.3 * k as f64).cos()];
         }
-        simulated.truth.shading = std::array::from_fn(|k| 0.05 / (1.0 + k as f64));
+        let shading = std::array::from_fn(|k| 0.05 / (1.0 + k as f64));
+        simulated.truth.light[..SHADING_TERMS].copy_from_slice(&shading);
         let found = simulated.solve(4000, &mut ChaCha8Rng::seed_from_u64(2));
         // A common factor belongs to the wall.
         let truth = &simulated.truth.frames;
@@ -257,9 +289,9 @@ mod tests {
             let off = found.biases[k] - bias;
             assert!(off.abs() < 0.3, "bias of frame {k} off by {off}");
         }
-        let off = differs(&found.shading, &simulated.truth.shading);
+        let off = differs(&found.shading, &shading);
         assert!(off < 0.005, "shading off by {off}");
-        assert!(found.is_shading_significant(3.0));
+        assert!(found.is_light_significant(3.0, false));
     }
 
     /// Frames of a wall without bias, taken in the light that is known already: neither shading nor
@@ -301,14 +333,18 @@ mod tests {
             "bias {square_bias} {expected_bias}"
         );
         // The stated variance is that of the draws.
-        let stated = found[0].shading_covariance.trace() / DRAWS as f64;
+        let stated = found[0]
+            .covariance
+            .fixed_view::<SHADING_TERMS, SHADING_TERMS>(0, 0)
+            .trace()
+            / DRAWS as f64;
         assert!(
             (0.5..2.0).contains(&(stated / expected)),
             "{stated} {expected}"
         );
         let significant = found
             .iter()
-            .filter(|found| found.is_shading_significant(1.5));
+            .filter(|found| found.is_light_significant(1.5, false));
         assert_eq!(significant.count(), 0);
     }
 
@@ -320,9 +356,10 @@ mod tests {
             glints: true,
             ..Simulated::plain()
         };
-        simulated.truth.shading = std::array::from_fn(|k| 0.1 / (1.0 + k as f64));
+        let truth = std::array::from_fn(|k| 0.1 / (1.0 + k as f64));
+        simulated.truth.light[..SHADING_TERMS].copy_from_slice(&truth);
         let found = simulated.solve(600, &mut ChaCha8Rng::seed_from_u64(5));
-        let off = differs(&found.shading, &simulated.truth.shading);
+        let off = differs(&found.shading, &truth);
         assert!(off < 0.001, "{off}");
     }
 
@@ -330,7 +367,12 @@ mod tests {
     fn points_seen_once_calibrate_nothing() {
         let once = Observation::new(0, [3.0, 4.0], 100.0, 1.0).unwrap();
         let points = [vec![once], Vec::new()];
-        assert!(PhotometricCalibration::solve(&points, 1, &Shading::none(SIZE), &PRIORS).is_none());
-        assert!(PhotometricCalibration::solve(&[], 1, &Shading::none(SIZE), &PRIORS).is_none());
+        assert!(
+            PhotometricCalibration::solve(&points, 1, &Shading::none(SIZE), None, &PRIORS)
+                .is_none()
+        );
+        assert!(
+            PhotometricCalibration::solve(&[], 1, &Shading::none(SIZE), None, &PRIORS).is_none()
+        );
     }
 }

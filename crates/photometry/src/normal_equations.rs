@@ -1,19 +1,18 @@
 //! Sparse normal equations of the photometric calibration, the wall eliminated.
 
-use super::observation::{FRAME_UNKNOWNS, Row, Unknowns};
+use super::observation::{FRAME_UNKNOWNS, LIGHT_TERMS, Row, Unknowns};
 use super::priors::Priors;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt;
 use faer::sparse::{SparseColMat, Triplet};
 use faer::{Col, Mat, Side};
 use nalgebra::SMatrix;
-use tunnelstitch_core::frames::SHADING_TERMS;
 
 /// Block of the normal matrix between two frames.
 type Block = [[f64; FRAME_UNKNOWNS]; FRAME_UNKNOWNS];
 
-/// Matrix over the shading's coefficients.
-pub type ShadingMatrix = SMatrix<f64, SHADING_TERMS, SHADING_TERMS>;
+/// Matrix over the light's unknowns.
+pub type LightMatrix = SMatrix<f64, LIGHT_TERMS, LIGHT_TERMS>;
 
 /// The normal equations `N x = g`, a block for each pair of frames that overlap and a border for
 /// the shading.
@@ -28,9 +27,9 @@ pub struct NormalEquations {
     /// Of each frame i, its blocks with frames j ≥ i, in ascending order of j.
     pairs: Vec<Vec<(usize, Block)>>,
     /// Of each unknown of a frame, its entries with the shading's.
-    border: Vec<[f64; SHADING_TERMS]>,
+    border: Vec<[f64; LIGHT_TERMS]>,
     /// Of the shading's unknowns, the lower triangle.
-    corner: [[f64; SHADING_TERMS]; SHADING_TERMS],
+    corner: [[f64; LIGHT_TERMS]; LIGHT_TERMS],
     /// Right side g.
     right: Vec<f64>,
 }
@@ -47,9 +46,9 @@ impl NormalEquations {
     pub fn zeros(frames: usize) -> Self {
         Self {
             pairs: vec![Vec::new(); frames],
-            border: vec![[0.0; SHADING_TERMS]; FRAME_UNKNOWNS * frames],
-            corner: [[0.0; SHADING_TERMS]; SHADING_TERMS],
-            right: vec![0.0; FRAME_UNKNOWNS * frames + SHADING_TERMS],
+            border: vec![[0.0; LIGHT_TERMS]; FRAME_UNKNOWNS * frames],
+            corner: [[0.0; LIGHT_TERMS]; LIGHT_TERMS],
+            right: vec![0.0; FRAME_UNKNOWNS * frames + LIGHT_TERMS],
         }
     }
 
@@ -57,7 +56,7 @@ impl NormalEquations {
     pub fn add(&mut self, point: &[Row], weights: &[f64], total: f64) {
         let shading = self.border.len();
         // Terms and logarithms relative to their weighted mean: the same as eliminating s.
-        let mut mean = [0.0; SHADING_TERMS];
+        let mut mean = [0.0; LIGHT_TERMS];
         let mut mean_log = 0.0;
         for (row, w) in point.iter().zip(weights) {
             for (mean, term) in mean.iter_mut().zip(&row.terms) {
@@ -67,7 +66,7 @@ impl NormalEquations {
         }
         for (a, (one, w)) in point.iter().zip(weights).enumerate() {
             let log = one.log - mean_log;
-            let terms: [f64; SHADING_TERMS] = std::array::from_fn(|k| one.terms[k] - mean[k]);
+            let terms: [f64; LIGHT_TERMS] = std::array::from_fn(|k| one.terms[k] - mean[k]);
             for (k, term) in terms.iter().enumerate() {
                 self.right[shading + k] += w * term * log;
                 for (entry, other) in self.corner[k].iter_mut().zip(&terms[..=k]) {
@@ -123,13 +122,13 @@ impl NormalEquations {
     }
 
     /// Solves `(N + σ² P) x = g − σ² P x₀` with P the inverse variances of the priors, σ² the
-    /// `variance` of the residuals, and x₀ the `known` shading, to which x is added; `None` if the
+    /// `variance` of the residuals, and x₀ the `known` light, to which x is added; `None` if the
     /// matrix is not positive definite.
     pub fn solve(
         &self,
         priors: &Priors,
         variance: f64,
-        known: &[f64; SHADING_TERMS],
+        known: &[f64; LIGHT_TERMS],
     ) -> Option<Solution> {
         let n = self.right.len();
         let matrix = SparseColMat::try_new_from_triplets(n, n, &self.lower(priors, variance));
@@ -147,7 +146,7 @@ impl NormalEquations {
         Some(Solution {
             x: Unknowns {
                 frames: (0..frames).map(own).collect(),
-                shading: std::array::from_fn(|k| x[self.border.len() + k]),
+                light: std::array::from_fn(|k| x[self.border.len() + k]),
             },
             factor,
         })
@@ -156,10 +155,9 @@ impl NormalEquations {
     /// The entry of `σ² P` of unknown k.
     fn prior(&self, priors: &Priors, variance: f64, k: usize) -> f64 {
         let own = [priors.log_gain_sigma, priors.bias_sigma_grey];
-        let sigma = if k < self.border.len() {
-            own[k % FRAME_UNKNOWNS]
-        } else {
-            priors.shading_sigma
+        let sigma = match k.checked_sub(self.border.len()) {
+            None => own[k % FRAME_UNKNOWNS],
+            Some(term) => priors.light_sigma(term),
         };
         variance / (sigma * sigma)
     }
@@ -183,7 +181,7 @@ impl NormalEquations {
                 }
             }
         }
-        for k in 0..SHADING_TERMS {
+        for k in 0..LIGHT_TERMS {
             for row in 0..border {
                 entries.push(Triplet::new(border + k, row, self.border[row][k]));
             }
@@ -196,14 +194,14 @@ impl NormalEquations {
 }
 
 impl Solution {
-    /// The shading's block of `(N + σ² P)⁻¹`; times σ², the covariance of its coefficients.
-    pub fn shading_cofactors(&self) -> ShadingMatrix {
+    /// The light's block of `(N + σ² P)⁻¹`; times σ², the covariance of its unknowns.
+    pub fn light_cofactors(&self) -> LightMatrix {
         let border = FRAME_UNKNOWNS * self.x.frames.len();
-        let unit = Mat::from_fn(border + SHADING_TERMS, SHADING_TERMS, |row, column| {
+        let unit = Mat::from_fn(border + LIGHT_TERMS, LIGHT_TERMS, |row, column| {
             if row == border + column { 1.0 } else { 0.0 }
         });
         let columns = self.factor.solve(&unit);
-        ShadingMatrix::from_fn(|row, column| columns[(border + row, column)])
+        LightMatrix::from_fn(|row, column| columns[(border + row, column)])
     }
 }
 
@@ -221,11 +219,12 @@ mod tests {
     use rand::{Rng, SeedableRng};
 
     const FRAMES: usize = 5;
-    const N: usize = FRAME_UNKNOWNS * FRAMES + SHADING_TERMS;
+    const N: usize = FRAME_UNKNOWNS * FRAMES + LIGHT_TERMS;
     const PRIORS: Priors = Priors {
         log_gain_sigma: 0.3,
         bias_sigma_grey: 1.0,
         shading_sigma: 0.5,
+        lamp_sigma: 0.5,
     };
     const VARIANCE: f64 = 1e-3;
 
@@ -263,7 +262,7 @@ mod tests {
 
     fn flat(x: &Unknowns) -> DVector<f64> {
         let own = x.frames.as_flattened().iter();
-        DVector::from_iterator(N, own.chain(&x.shading).copied())
+        DVector::from_iterator(N, own.chain(&x.light).copied())
     }
 
     /// `min_s Σ w (y − s − rᵀx)²` over all points.
@@ -297,11 +296,11 @@ mod tests {
     fn the_solution_is_the_minimum_of_the_cost() {
         let points = points();
         let solution = normal(&points)
-            .solve(&PRIORS, VARIANCE, &[0.0; SHADING_TERMS])
+            .solve(&PRIORS, VARIANCE, &[0.0; LIGHT_TERMS])
             .unwrap();
         let x = flat(&solution.x);
         let sigma = |k: usize| match k.checked_sub(FRAME_UNKNOWNS * FRAMES) {
-            Some(_) => PRIORS.shading_sigma,
+            Some(term) => PRIORS.light_sigma(term),
             None => [PRIORS.log_gain_sigma, PRIORS.bias_sigma_grey][k % FRAME_UNKNOWNS],
         };
         let all = |x: &DVector<f64>| {
@@ -334,10 +333,9 @@ mod tests {
             matrix -= &sum * sum.transpose() / weights.iter().sum::<f64>();
         }
         for k in 0..N {
-            let sigma = if k >= FRAME_UNKNOWNS * FRAMES {
-                PRIORS.shading_sigma
-            } else {
-                [PRIORS.log_gain_sigma, PRIORS.bias_sigma_grey][k % FRAME_UNKNOWNS]
+            let sigma = match k.checked_sub(FRAME_UNKNOWNS * FRAMES) {
+                Some(term) => PRIORS.light_sigma(term),
+                None => [PRIORS.log_gain_sigma, PRIORS.bias_sigma_grey][k % FRAME_UNKNOWNS],
             };
             matrix[(k, k)] += VARIANCE / (sigma * sigma);
         }
@@ -350,9 +348,9 @@ mod tests {
         sparse.fill_upper_triangle_with_lower_triangle();
         assert!((&sparse - &matrix).amax() < 1e-10);
         let cofactors = normal
-            .solve(&PRIORS, VARIANCE, &[0.0; SHADING_TERMS])
+            .solve(&PRIORS, VARIANCE, &[0.0; LIGHT_TERMS])
             .unwrap()
-            .shading_cofactors();
+            .light_cofactors();
         let inverse = matrix.try_inverse().unwrap();
         let expected = inverse.view_range(FRAME_UNKNOWNS * FRAMES.., FRAME_UNKNOWNS * FRAMES..);
         assert!((cofactors - expected).amax() < 1e-8 * expected.amax());

@@ -3,13 +3,16 @@
 use super::robust_weights::{RobustWeights, median};
 use nalgebra::Vector2;
 use std::ops::Range;
-use tunnelstitch_core::frames::{SHADING_TERMS, shading_terms};
+use tunnelstitch_core::frames::{LAMP_TERMS, SHADING_TERMS, shading_terms};
 
 /// Grey values of a frame, of 255, that determine a factor: a darker one is mostly bias and noise,
 /// a brighter one may be clipped.
 const USABLE_GREY: Range<f32> = 4.0..250.0;
 /// Smallest share of a value that remains when the bias is taken off.
 const MIN_VALUE_SHARE: f64 = 0.1;
+
+/// Unknowns of the light that all frames share: coefficients of the shading, then the lamp's.
+pub const LIGHT_TERMS: usize = SHADING_TERMS + LAMP_TERMS;
 
 /// Unknowns of a frame: α, β.
 pub const FRAME_UNKNOWNS: usize = 2;
@@ -23,8 +26,10 @@ pub struct Observation {
     pixel: [f32; 2],
     /// `z`, the value without the known bias and the known factor.
     value: f32,
-    /// `f`, the known part of gain and shading.
+    /// `f`, the known part of gain and light.
     factor: f32,
+    /// Derivatives of the logarithm of the light by the lamp's unknowns.
+    lamp: [f32; LAMP_TERMS],
 }
 
 impl Observation {
@@ -41,17 +46,41 @@ impl Observation {
             pixel,
             value,
             factor,
+            lamp: [0.0; LAMP_TERMS],
+        })
+    }
+
+    /// The observation with the derivatives of the logarithm of the light by the lamp's unknowns
+    /// ([`tunnelstitch_core::frames::Lamp::terms`]); without, there is no lamp.
+    pub fn with_lamp(self, terms: [f64; LAMP_TERMS]) -> Self {
+        Self {
+            lamp: terms.map(|term| term as f32),
+            ..self
+        }
+    }
+
+    /// The observation without a lamp.
+    pub fn without_lamp(&self) -> Self {
+        self.with_lamp([0.0; LAMP_TERMS])
+    }
+
+    /// Regressors of the light: `B_k`, then the lamp's.
+    fn terms(&self, size: (usize, usize)) -> [f64; LIGHT_TERMS] {
+        let shading = shading_terms(&self.pixel(), size);
+        std::array::from_fn(|k| match k.checked_sub(SHADING_TERMS) {
+            Some(lamp) => f64::from(self.lamp[lamp]),
+            None => shading[k],
         })
     }
 }
 
-/// The unknowns of all frames and the shading.
+/// The unknowns of all frames and of the light.
 #[derive(Clone, Debug)]
 pub struct Unknowns {
     /// `α_i, β_i`.
     pub frames: Vec<[f64; FRAME_UNKNOWNS]>,
-    /// `c_k`.
-    pub shading: [f64; SHADING_TERMS],
+    /// `c_k`: coefficients of the shading, then the lamp's unknowns.
+    pub light: [f64; LIGHT_TERMS],
 }
 
 impl Unknowns {
@@ -59,7 +88,7 @@ impl Unknowns {
     pub fn zeros(frames: usize) -> Self {
         Self {
             frames: vec![[0.0; FRAME_UNKNOWNS]; frames],
-            shading: [0.0; SHADING_TERMS],
+            light: [0.0; LIGHT_TERMS],
         }
     }
 }
@@ -71,8 +100,8 @@ pub struct Row {
     pub frame: usize,
     /// Regressors of α and β: `1, 1/(f m)`.
     pub own: [f64; FRAME_UNKNOWNS],
-    /// Regressors of the shading's coefficients: `B_k`.
-    pub terms: [f64; SHADING_TERMS],
+    /// Regressors of the light's unknowns: `B_k`, then the lamp's.
+    pub terms: [f64; LIGHT_TERMS],
     /// `ln(z − β/f) + β/(f m)` with the bias β of the solution so far: `ln z` to first order.
     pub log: f64,
 }
@@ -116,7 +145,7 @@ impl LinearisedPoint {
 /// An observation's reading of the wall by the solution so far.
 struct WallReading {
     frame: usize,
-    terms: [f64; SHADING_TERMS],
+    terms: [f64; LIGHT_TERMS],
     factor: f64,
     /// `ln(z − β/f)`.
     log: f64,
@@ -128,14 +157,13 @@ struct WallReading {
 
 impl WallReading {
     fn new(observation: &Observation, size: (usize, usize), x: &Unknowns) -> Self {
-        let [u, v] = observation.pixel.map(f64::from);
-        let terms = shading_terms(&Vector2::new(u, v), size);
+        let terms = observation.terms(size);
         let [log_gain, bias] = x.frames[observation.frame];
         let (value, factor) = (f64::from(observation.value), f64::from(observation.factor));
-        let shading: f64 = terms.iter().zip(&x.shading).map(|(t, c)| t * c).sum();
+        let light: f64 = terms.iter().zip(&x.light).map(|(t, c)| t * c).sum();
         Self {
             frame: observation.frame,
-            light: log_gain + shading,
+            light: log_gain + light,
             terms,
             factor,
             log: (value - bias / factor).max(MIN_VALUE_SHARE * value).ln(),
@@ -176,24 +204,24 @@ mod tests {
 
     /// The exact equation: `ln(S exp(α + Σ c B) + β/f)`.
     fn exact_log(observation: &Observation, wall: f64, x: &Unknowns) -> f64 {
-        let [u, v] = observation.pixel.map(f64::from);
-        let terms = shading_terms(&Vector2::new(u, v), SIZE);
-        let shading: f64 = terms.iter().zip(&x.shading).map(|(t, c)| t * c).sum();
+        let terms = observation.terms(SIZE);
+        let light: f64 = terms.iter().zip(&x.light).map(|(t, c)| t * c).sum();
         let [log_gain, bias] = x.frames[observation.frame];
-        (wall * (log_gain + shading).exp() + bias / f64::from(observation.factor)).ln()
+        (wall * (log_gain + light).exp() + bias / f64::from(observation.factor)).ln()
     }
 
     fn without_bias() -> (Unknowns, [([f32; 2], f32); 2]) {
         let mut x = Unknowns::zeros(2);
         x.frames = vec![[0.1, 0.0], [-0.2, 0.0]];
-        x.shading = std::array::from_fn(|k| 0.05 * (k as f64).cos());
+        x.light = std::array::from_fn(|k| 0.05 * (k as f64).cos());
         (x, [([10.0, 40.0], 0.5), ([50.0, 20.0], 1.5)])
     }
 
     /// Observations of a wall point by two frames.
     fn point(wall: f64, x: &Unknowns, places: [([f32; 2], f32); 2]) -> Vec<Observation> {
         let seen = (0..).zip(places).map(|(frame, (pixel, factor))| {
-            let mut seen = Observation::new(frame, pixel, 60.0, factor).unwrap();
+            let seen = Observation::new(frame, pixel, 60.0, factor).unwrap();
+            let mut seen = seen.with_lamp([0.4, -0.3, frame as f64]);
             seen.value = exact_log(&seen, wall, x).exp() as f32;
             seen
         });
@@ -223,7 +251,7 @@ mod tests {
                 );
             }
             for (k, regressor) in row.terms.iter().enumerate() {
-                let expected = slope(&|x, step| x.shading[k] += step);
+                let expected = slope(&|x, step| x.light[k] += step);
                 assert!(
                     (regressor - expected).abs() < 1e-7,
                     "{regressor} {expected}"

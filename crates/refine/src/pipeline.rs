@@ -127,8 +127,12 @@ fn run_stages(
         let fits = ended.as_ref().is_some_and(|ended| fits_light(stage, ended));
         estimation = match ended {
             _ if !fits && may_normalise(setup) => {
+                let light = setup.frames.camera_light();
                 setup.frames.set_light(Light::Normalised);
-                Estimation::new(begin(setup))
+                Estimation::new(PipelineState {
+                    is_lamp_ruled_out: light.is_some_and(|light| light.lamp.is_some()),
+                    ..begin(setup)
+                })
             }
             Some(Estimation {
                 hidden_bands: Some(bands),

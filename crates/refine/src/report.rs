@@ -153,6 +153,10 @@ pub struct RefineReport {
     pub frames_on_prior: usize,
     /// Treatment of the light: by the model, or by local normalisation.
     pub photometry: Photometry,
+    /// Position of the lamp in the camera's frame (x right, y down, z along the optical axis),
+    /// metres, if the light is found to be that of one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lamp_m: Option<[f64; 3]>,
     /// The covariance over the inverse of the normal matrix, c of
     /// [`crate::uncertainty::covariance`]: above 1 where residuals err together, below
     /// where they cancel.

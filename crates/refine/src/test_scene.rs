@@ -133,7 +133,9 @@ pub fn posed_spiral(frames: usize) -> (Circle, Camera, WallGrid, Vec<PosedFrame>
     let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
     let posed = spiral(frames, 0.1, 30f64.to_radians())
         .into_iter()
-        .map(|pose| PosedFrame {
+        .enumerate()
+        .map(|(index, pose)| PosedFrame {
+            index,
             sweep: Sweep::default(),
             pose,
             footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),

@@ -207,16 +207,14 @@ pub mod footprints {
     pub const MAX_OVERLAP_DISTANCE_FRAMES: usize = 256;
 }
 
-/// Thresholds of `samples/tile_projection.rs` and `samples/visibility.rs`.
+/// Thresholds of `samples/visibility.rs`.
 pub mod visibility {
-    /// Least area of a tile's sample in a frame over that at the distance the lattice was laid out
-    /// for, and over that in the frame that sees the tile best. What a frame resolves less is
-    /// blurred against the others, so that their differences are no noise, and a pixel is spread
-    /// over many samples.
+    /// Least area of a tile's sample in a frame over that in the frame that sees the tile best. What
+    /// a frame resolves less is blurred against the others, and their differences are no noise.
     ///
-    /// Higher: more oblique or distant wall is excluded. Chosen by: cameras that look along the
-    /// tunnel, whose time and residuals fall as it rises from 0.05.
-    pub const MIN_RELATIVE_SAMPLE_AREA: f64 = 0.2;
+    /// Higher: frames along the tunnel are compared with fewer others. Chosen by: a camera that looks
+    /// along the tunnel, whose frames disagree half as much at 0.15 to 0.25 as at 0.05.
+    pub const MIN_RELATIVE_SHARPNESS: f32 = 0.2;
 }
 
 /// Thresholds of `samples/outlier_mask.rs`.

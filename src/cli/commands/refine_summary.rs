@@ -113,6 +113,12 @@ pub fn print_outputs(report: &RefineReport, out: &Path, files: &[String], termin
              of a model with gain, bias and one shading for all",
         );
     }
+    if let Some([x, y, z]) = report.lamp_m {
+        terminal.say(format!(
+            "  the light is that of a lamp at ({x:.2}, {y:.2}, {z:.2}) m in the camera's frame (x right, y \
+             down, z ahead)"
+        ));
+    }
     print_wall(report, out, terminal);
     terminal.say(format!("  {}", report.scale.sentence()));
     terminal.say(format!("wrote {}: {}", printed(out), files.join(", ")));

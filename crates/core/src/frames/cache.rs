@@ -4,12 +4,11 @@ use super::error::FrameError;
 use super::frame_file::FrameFile;
 use super::frame_set::FrameSet;
 use super::grey::GreyImage;
+use super::light::{CameraLight, Light};
 use super::local_normalisation::normalise_locally;
 use super::mask::{Mask, PyramidMask};
 use super::pyramid::Pyramid;
-use super::shading::Shading;
 use super::stored_frame::StoredFrame;
-use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use tunnelstitch_geometry::camera::Camera;
@@ -43,18 +42,6 @@ pub struct FrameCache {
 enum Source {
     Files(FrameSet, Box<Camera>),
     Memory(Vec<Arc<Pyramid>>, Option<Arc<Mask>>),
-}
-
-/// Treatment of the frames' light.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub enum Light {
-    /// As it is.
-    #[default]
-    Even,
-    /// Divided by a shading that all frames have in common.
-    Shaded(Box<Shading>),
-    /// Taken off by local normalisation ([`normalise_locally`]).
-    Normalised,
 }
 
 /// The most recently used pyramids.
@@ -153,12 +140,19 @@ impl FrameCache {
         light.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The shading by which frames are divided.
-    pub fn shading(&self) -> Option<Shading> {
+    /// The light by which frames are divided.
+    pub fn camera_light(&self) -> Option<Arc<CameraLight>> {
         match self.light() {
-            Light::Shaded(shading) => Some(*shading),
+            Light::Shaded(light) => Some(light),
             Light::Even | Light::Normalised => None,
         }
+    }
+
+    /// Position of the lamp in the camera's frame, metres, if frames are divided by its light.
+    pub fn lamp_m(&self) -> Option<[f64; 3]> {
+        let light = self.camera_light()?;
+        let (lamp, _) = light.lamp.as_ref()?;
+        Some((lamp.position * lamp.reach_m).into())
     }
 
     /// Sets the treatment of the frames' light and drops the cached pyramids.
@@ -194,7 +188,7 @@ impl FrameCache {
         }
         match self.light() {
             Light::Even => {}
-            Light::Shaded(shading) => shading.divide(&mut image),
+            Light::Shaded(light) => light.divide(frame, &mut image),
             Light::Normalised => image = normalise_locally(&image),
         }
         let pyramid = Arc::new(Pyramid::new(image, self.levels));

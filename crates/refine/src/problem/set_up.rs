@@ -39,6 +39,7 @@ pub fn pose_frames(
         let pose = window.estimates[k].pose;
         let sweep = rates[k].scaled(readout_s);
         Ok(Some(PosedFrame {
+            index: frame,
             pose,
             sweep,
             footprint: footprint(context, &camera.with_sweep(&sweep), frame, &pose)?,

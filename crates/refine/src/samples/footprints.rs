@@ -14,6 +14,10 @@ use tunnelstitch_geometry::trajectory::Pose;
 /// At an angle φ to the section the wall is `1/cos φ` away, and `cos³ φ` of the pixels are left:
 /// here a twentieth.
 pub const RESOLVED_RANGE_RADII: f64 = 2.7;
+/// Least area of a piece of the wall in a frame, over that when it is seen squarely from the axis,
+/// for being resolved: `cos³ φ` at [`RESOLVED_RANGE_RADII`].
+pub const MIN_RESOLVED_SHARE: f64 =
+    1.0 / (RESOLVED_RANGE_RADII * RESOLVED_RANGE_RADII * RESOLVED_RANGE_RADII);
 
 /// Footprint of frame `frame` at `pose`, taken by `camera`.
 ///

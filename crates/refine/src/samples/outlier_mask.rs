@@ -246,7 +246,9 @@ mod tests {
         let posed: Vec<PosedFrame> = wall
             .poses
             .iter()
-            .map(|pose| PosedFrame {
+            .enumerate()
+            .map(|(index, pose)| PosedFrame {
+                index,
                 sweep: Sweep::default(),
                 pose: *pose,
                 footprint: Footprint::trace(&wall.circle, &camera, pose).unwrap(),

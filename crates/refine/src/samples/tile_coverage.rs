@@ -160,7 +160,7 @@ impl<'a> TileCoverage<'a> {
             self.surface.as_ref(),
             &self.grid,
             &self.camera,
-            self.images.frames.shading().as_ref(),
+            self.images.frames.camera_light().as_deref(),
             &self.exclusions,
             &posed,
             rows,

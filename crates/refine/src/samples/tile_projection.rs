@@ -1,10 +1,10 @@
 //! Projection of a tile into a frame.
 
+use crate::samples::footprints::MIN_RESOLVED_SHARE;
 use crate::samples::observer::Observer;
-use crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA;
 use crate::tiles::grid::{SIDE, WallGrid};
 use nalgebra::{Vector2, Vector3};
-use tunnelstitch_core::frames::{PyramidMask, Shading};
+use tunnelstitch_core::frames::{CameraLight, PyramidMask};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::trajectory::Pose;
 
@@ -42,7 +42,7 @@ pub fn project_tile(
     // Half the cross product of the diagonals; the corners come row by row.
     let area = 0.5 * (d - a).perp(&(c - b)).abs();
     let pixels = area / SAMPLES_BETWEEN_CORNERS;
-    if pixels < MIN_RELATIVE_SAMPLE_AREA * grid.density.powi(-2) {
+    if pixels < MIN_RESOLVED_SHARE * grid.density.powi(-2) {
         return None;
     }
     let centre = 0.25 * (a + b + c + d);
@@ -61,11 +61,18 @@ pub fn project_tile(
 }
 
 impl TileProjection {
-    /// Frame `frame` as an observer of the tile.
-    pub fn observer(&self, frame: usize, camera: &Camera, shading: Option<&Shading>) -> Observer {
-        let shade = shading.map_or(1.0, |shading| shading.at_level(&self.centre, camera));
+    /// A frame, the one of index `k` among those of the visibility and of `index` in the survey, as
+    /// an observer of the tile.
+    pub fn observer(
+        &self,
+        k: usize,
+        index: usize,
+        camera: &Camera,
+        light: Option<&CameraLight>,
+    ) -> Observer {
+        let shade = light.map_or(1.0, |light| light.at_level(index, &self.centre, camera));
         Observer {
-            frame: frame as u32,
+            frame: k as u32,
             pixels: self.pixels as f32,
             shade: shade as f32,
         }

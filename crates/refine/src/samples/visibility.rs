@@ -4,11 +4,11 @@ use crate::samples::observer::Observer;
 use crate::samples::observer_marks::ObserverMarks;
 use crate::samples::tile_candidates::{TileNumbering, TileRange};
 use crate::samples::tile_projection::project_tile;
-use crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA;
+use crate::thresholds::visibility::MIN_RELATIVE_SHARPNESS;
 use crate::tiles::grid::{TileId, WallGrid};
 use std::collections::HashSet;
 use std::ops::Range;
-use tunnelstitch_core::frames::{PyramidMask, Shading};
+use tunnelstitch_core::frames::{CameraLight, PyramidMask};
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{Footprint, Surface, WallRegions};
@@ -26,6 +26,8 @@ pub struct Tile {
 /// A frame with its pose, at which the samples are selected.
 #[derive(Clone, Copy, Debug)]
 pub struct PosedFrame {
+    /// Index of the frame in the survey.
+    pub index: usize,
     /// Pose.
     pub pose: Pose,
     /// Motion during the readout.
@@ -77,7 +79,7 @@ impl Visibility {
         surface: &dyn Surface,
         grid: &WallGrid,
         camera: &Camera,
-        shading: Option<&Shading>,
+        light: Option<&CameraLight>,
         exclusions: &Exclusions,
         posed: &[PosedFrame],
         rows: &Range<i64>,
@@ -99,7 +101,7 @@ impl Visibility {
                 };
                 let projection = project_tile(grid, camera, mask, &frame.pose, corners);
                 if let Some(projection) = projection {
-                    tiles.push((tile, projection.observer(k, camera, shading)));
+                    tiles.push((tile, projection.observer(k, frame.index, camera, light)));
                 }
             }
             tiles
@@ -127,7 +129,7 @@ impl Visibility {
         for tile in 0..numbering.count() {
             let group = &sorted[starts[tile]..starts[tile + 1]];
             let sharpest = group.iter().fold(0.0f32, |most, o| most.max(o.pixels));
-            let least = MIN_RELATIVE_SAMPLE_AREA as f32 * sharpest;
+            let least = MIN_RELATIVE_SHARPNESS * sharpest;
             let sharp = group.iter().copied().filter(|o| o.pixels >= least);
             let mut active = sharp.clone().map(|o| posed[o.frame as usize].active);
             if sharp.clone().nth(1).is_none() || !active.any(|active| active) {

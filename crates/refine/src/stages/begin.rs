@@ -19,6 +19,7 @@ pub fn begin(setup: &Setup) -> PipelineState {
         over: Vec::new(),
         noise: 0.0,
         has_common_light: true,
+        is_lamp_ruled_out: false,
         dispersion: 1.0,
         solved: frames.clone(),
         frames,

@@ -233,6 +233,10 @@ impl Placement {
                     Light::Normalised => Photometry::Normalised,
                     Light::Even | Light::Shaded(_) => Photometry::Model,
                 },
+                lamp_m: setup
+                    .frames
+                    .lamp_m()
+                    .map(|lamp_m| lamp_m.map(|x| x * scale)),
                 variance_factor: self.covariances.variance_factor,
                 model_error: parts.model_error,
                 prior_test: self.prior_test,

@@ -31,15 +31,15 @@ pub enum Stage {
     Assess,
 }
 
-/// The stages of a refinement: track coarsely, solve at full size, check, repair, solve with denser
+/// The stages of a refinement: track coarsely, check, solve at full size, repair, solve with denser
 /// samples, assess.
 pub fn plan_stages(options: &RefineOptions) -> VecDeque<Stage> {
     let mut stages = VecDeque::from([
         Stage::Prescreen,
         Stage::Track,
         Stage::CorrectShading,
-        Stage::Solve(SolvePlan::first(options)),
         Stage::ValidatePairs,
+        Stage::Solve(SolvePlan::first(options)),
         Stage::Repair,
         Stage::Solve(SolvePlan::last(options)),
     ]);
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn poses_are_checked_after_the_first_solve_and_solved_densely_at_last() {
+    fn poses_are_checked_before_they_are_solved_and_solved_densely_at_last() {
         let options = RefineOptions {
             joint: true,
             ..RefineOptions::default()
@@ -139,7 +139,7 @@ mod tests {
         let solves: Vec<(f64, bool)> = solves.collect();
         let joint = joint::SAMPLES_PER_PIXEL;
         assert_eq!(solves, [(1.0, false), (2.0, false), (joint, true)]);
-        assert_eq!(stages[4], Stage::ValidatePairs);
+        assert_eq!(stages[3], Stage::ValidatePairs);
         assert_eq!(stages.back(), Some(&Stage::Assess));
     }
 }

@@ -5,7 +5,8 @@ use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
 use crate::tracking::prescreening;
-use tunnelstitch_core::frames::Light;
+use std::sync::Arc;
+use tunnelstitch_core::frames::{CameraLight, Light};
 
 /// Runs the stage on every frame at the coarsest pyramid level.
 ///
@@ -20,7 +21,9 @@ pub fn run<'a>(
     let coarsest = setup.coarsest_level();
     let prescreened = prescreening::prescreen(&context, coarsest, session.progress.as_ref())?;
     if let (Light::Even, Some(shading)) = (setup.frames.light(), prescreened.shading) {
-        setup.frames.set_light(Light::Shaded(Box::new(shading)));
+        setup
+            .frames
+            .set_light(Light::Shaded(Arc::new(CameraLight::common(shading))));
     }
     estimation.state.noise = prescreened.noise;
     estimation.state.frames.rejections = prescreened.rejections;

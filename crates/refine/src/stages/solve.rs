@@ -3,17 +3,19 @@
 use crate::error::RefineError;
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
-use crate::options::RefineOptions;
+use crate::options::{Photometry, RefineOptions};
+use crate::parameters::frame_estimate::FrameEstimate;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::hidden_bands::find_hidden_bands;
 use crate::solver::argmin_glue::{self, Observation};
 use crate::solver::gauss_newton::{Solution, SolveState};
+use crate::solver::neighbourhood::Neighbourhood;
 use crate::stages::plan::{SolvePlan, Stage};
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::shape;
 use crate::stages::state::{Estimation, GlobalSolve, LastSolve, PipelineState};
-use crate::tracking::shading_correction::correct_once;
+use crate::tracking::shading_correction::{correct_once, find_lamp};
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::validation::inconsistent_frames::reject_disagreeing_frames;
@@ -82,8 +84,8 @@ pub fn run<'a>(
         estimation.hidden_bands =
             find_hidden_bands(&masked, context.nominal.as_ref(), &setup.hidden_bands);
     }
-    if has_solve_ahead(state) && setup.frames.shading().is_some() {
-        correct_once(&context, setup.options, &state.frames)?;
+    if has_solve_ahead(state) {
+        correct_light(&plan, setup, &context, state)?;
     }
     // The assessment uses the last one only.
     if let Some(uncertainty) = uncertainty.filter(|_| !has_solve_ahead(state)) {
@@ -154,6 +156,41 @@ fn solve<'a>(
     let solution = argmin_glue::resume(problem, plan.stopping, begun, Some(observation))?;
     progress.finish();
     Ok(solution)
+}
+
+/// Corrects the light by the poses of a solve: a lamp is looked for, if there may be one, and frames
+/// that had to be compared by their contrast are compared in its light from now on. Their exposures
+/// are others then, so the solve is repeated.
+fn correct_light(
+    plan: &SolvePlan,
+    setup: &Setup,
+    context: &EstimationContext,
+    state: &mut PipelineState,
+) -> Result<(), ProblemError> {
+    let light = setup.frames.camera_light();
+    let has_lamp = light.as_ref().is_some_and(|light| light.lamp.is_some());
+    let may_have_lamp =
+        setup.options.photometry != Photometry::Normalised && !state.is_lamp_ruled_out && !has_lamp;
+    let found = match may_have_lamp {
+        true => find_lamp(context, setup.options, &state.frames)?,
+        false => None,
+    };
+    if let Some(noise) = found {
+        state.noise = noise;
+        if light.is_none() {
+            state.frames.estimates = (state.frames.estimates.iter())
+                .map(|estimate| FrameEstimate::at(estimate.pose))
+                .collect();
+        }
+        let context = setup.context(state);
+        let levels = setup.handover_level()..=setup.coarsest_level();
+        let all = Neighbourhood::of_all(&state.frames);
+        all.solve(&context, setup.options, levels, &mut state.frames)?;
+        plan_again(plan, setup.options, state);
+    } else if light.is_some() {
+        correct_once(context, setup.options, &state.frames)?;
+    }
+    Ok(())
 }
 
 /// The uncertainty of the last solution; before, unknowns may be free that it turns out not to

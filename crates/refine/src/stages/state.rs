@@ -28,6 +28,8 @@ pub struct PipelineState {
     pub noise: f64,
     /// False if the light has turned out to be no shading that all frames have in common.
     pub has_common_light: bool,
+    /// True if most frames did not fit in the light of a lamp.
+    pub is_lamp_ruled_out: bool,
     /// Dispersion of the residuals ([`crate::uncertainty::model_error`]), once it is known.
     pub dispersion: f64,
     /// The frames: estimates (none before they are tracked) and rejection reasons.

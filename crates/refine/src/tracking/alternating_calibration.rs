@@ -66,7 +66,7 @@ impl AlternatingCalibration {
         let mut least_change = f64::INFINITY;
         let frames = self.rejections.len().min(MAX_SHADING_FRAMES);
         for _ in 0..MAX_TRACKING_ITERATIONS {
-            let Some(before) = context.frames.shading() else {
+            let Some(before) = context.frames.camera_light() else {
                 return Ok(true);
             };
             self.tracking = Tracking::new(self.rejections.clone(), self.kappa);
@@ -79,7 +79,7 @@ impl AlternatingCalibration {
             let mut states = self.tracking.tracked_states();
             let context = context.at(states.kappa);
             let observed = correct_until_settled(&context, options, &mut states)?;
-            let after = context.frames.shading();
+            let after = context.frames.camera_light();
             let change = after.map_or(0.0, |after| after.relative_difference(&before, observed));
             if change < MAX_SHADING_CHANGE {
                 return Ok(true);

@@ -3,7 +3,7 @@
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::samples::footprints::RESOLVED_RANGE_RADII;
+use crate::samples::footprints::{MIN_RESOLVED_SHARE, RESOLVED_RANGE_RADII};
 use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
 use crate::tracking::ncc_score::NccScore;
 use crate::tracking::unwrapped_frame::{UnwrappedFrame, UnwrappedSampler};
@@ -32,13 +32,6 @@ pub struct ReferenceMosaic {
     pub is_resolved: Vec<bool>,
 }
 
-/// Least share of its pixels that a wall point must be seen with, of those when seen squarely from
-/// the axis: `cos³ φ` at [`RESOLVED_RANGE_RADII`].
-const LEAST_SHARE: f32 = {
-    let range = RESOLVED_RANGE_RADII as f32;
-    1.0 / (range * range * range)
-};
-
 /// A camera position, from which walls that are far off or oblique are hardly resolved.
 struct Viewpoint {
     /// The camera's centre relative to the origin, metres.
@@ -47,15 +40,16 @@ struct Viewpoint {
 }
 
 impl Viewpoint {
-    /// True if a wall point with this normal is seen with at least as many pixels as a camera on
-    /// the axis has at [`RESOLVED_RANGE_RADII`].
+    /// True if a wall point with this normal is seen with at least the share [`MIN_RESOLVED_SHARE`]
+    /// of the pixels that it has when seen squarely from the axis.
     ///
     /// At distance d and angle β to the normal the share is `cos β (r/d)²`.
     #[inline]
     fn resolves(&self, point: &[f32; 3], normal: &Vector3<f32>) -> bool {
         let ray = Vector3::from(*point) - self.centre;
         let square = ray.norm_squared();
-        ray.dot(normal).abs() * self.radius_m * self.radius_m > LEAST_SHARE * square * square.sqrt()
+        ray.dot(normal).abs() * self.radius_m * self.radius_m
+            > MIN_RESOLVED_SHARE as f32 * square * square.sqrt()
     }
 }
 

@@ -77,7 +77,8 @@ impl Exposure {
         let size = thumbnails.full_size();
         let even = Shading::none(size);
         let points = observe_points(surface, thumbnails, placements, &grid);
-        let Some(found) = PhotometricCalibration::solve(&points, count, &even, &Priors::default())
+        let priors = Priors::default();
+        let Some(found) = PhotometricCalibration::solve(&points, count, &even, None, &priors)
         else {
             return Self {
                 scale: white / 255.0,
