@@ -20,7 +20,7 @@ pub struct DeformationCheck {
     pub node_m: f64,
     /// Of a node between the first and the last camera, in the median.
     pub node_sigma_mm: f64,
-    /// The same before any frame is seen.
+    /// That of a node before any frame is seen.
     pub prior_sigma_mm: f64,
     /// Of the amplitudes of cos mθ and sin mθ over the survey, m = 2 (ovality) to 5.
     pub harmonic_sigma_mm: Vec<f64>,
@@ -30,8 +30,8 @@ pub struct DeformationCheck {
 }
 
 impl DeformationCheck {
-    /// What pictures with the texture of `pictures` can tell of the deformation at the initial
-    /// poses; None if the wall is said to be exact, or if there is no texture or no overlap.
+    /// The bound for pictures with the texture of `pictures` at the initial poses; None if the wall
+    /// is said to be exact, or if there is no texture or no overlap.
     pub(super) fn of(
         survey: &Survey,
         pictures: &PictureCheck,

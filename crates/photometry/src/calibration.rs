@@ -39,8 +39,8 @@ pub struct PhotometricCalibration {
 
 impl PhotometricCalibration {
     /// Calibrates `frames` frames of the size of `known`, the shading that is known already beside
-    /// the `lamp`, by their observations of wall `points`; `None` if no point is observed twice or the normal
-    /// matrix is not positive definite.
+    /// the `lamp`, by their observations of wall `points`; `None` if no point is observed twice or
+    /// the normal matrix is not positive definite.
     ///
     /// The prior holds for all of the shading, what is known included. Noise is independent from
     /// point to point, but what the model leaves out (things that are not of the wall, wall that is

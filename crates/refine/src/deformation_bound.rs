@@ -46,7 +46,7 @@ const SHORTER_SIDE: u32 = 60;
 /// Right sides that are solved for at once.
 const BATCH: usize = 16;
 
-/// What pictures show of the wall.
+/// Texture and noise of pictures of the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureTexture {
     /// RMS of the texture's slope along either axis, grey levels per pixel.
@@ -63,7 +63,7 @@ pub struct DeformationBound {
     pub node_m: f64,
     /// 1-σ of the deformation at a node, median between the first and the last camera, metres.
     pub node_sigma_m: f64,
-    /// The same before any frame is seen, metres.
+    /// That 1-σ before any frame is seen, metres.
     pub prior_sigma_m: f64,
     /// 1-σ of the amplitudes of cos mθ and sin mθ over the survey, root mean square of both,
     /// m = 2 … 5, metres.

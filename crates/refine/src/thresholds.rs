@@ -209,11 +209,11 @@ pub mod footprints {
 
 /// Thresholds of `samples/visibility.rs`.
 pub mod visibility {
-    /// Least area of a tile's sample in a frame over that in the frame that sees the tile best. What
-    /// a frame resolves less is blurred against the others, and their differences are no noise.
+    /// Least area of a tile's sample in a frame over that in the frame that sees the tile best.
+    /// Where a frame resolves less it is blurred against the others, and differences are no noise.
     ///
-    /// Higher: frames along the tunnel are compared with fewer others. Chosen by: a camera that looks
-    /// along the tunnel, whose frames disagree half as much at 0.15 to 0.25 as at 0.05.
+    /// Higher: frames along the tunnel are compared with fewer others. Chosen by: a camera that
+    /// looks along the tunnel, whose frames disagree half as much at 0.15 to 0.25 as at 0.05.
     pub const MIN_RELATIVE_SHARPNESS: f32 = 0.2;
 }
 

@@ -115,8 +115,8 @@ pub fn print_outputs(report: &RefineReport, out: &Path, files: &[String], termin
     }
     if let Some([x, y, z]) = report.lamp_m {
         terminal.say(format!(
-            "  the light is that of a lamp at ({x:.2}, {y:.2}, {z:.2}) m in the camera's frame (x right, y \
-             down, z ahead)"
+            "  the light is that of a lamp at ({x:.2}, {y:.2}, {z:.2}) m in the camera's frame \
+             (x right, y down, z ahead)"
         ));
     }
     print_wall(report, out, terminal);

@@ -1,8 +1,8 @@
 //! A lamp that moves with the camera: its light on the wall by pose and shape.
 //!
 //! A small lamp at l, in the camera's frame, lights a matt wall point x with the unit normal n in
-//! proportion to `L = cos ψ r²/ρ²`, where ρ is the distance of the lamp and ψ the angle of its ray to
-//! the normal; r only makes it a number:
+//! proportion to `L = cos ψ r²/ρ²`, where ρ is the distance of the lamp and ψ the angle of its ray
+//! to the normal; r only makes it a number:
 //!
 //! `ln L = ln(|w·n| r²/ρ³)`,   `w = x − t − R l`,   `ρ = |w|`.
 //!

@@ -14,8 +14,8 @@
 //!
 //! The objective is that of [`crate::tiles::tile`]. [`set_up`] has the steps of the set-up.
 //! [`step_length`] measures a step on the wall; [`unknown_texture`] reduces the information to that
-//! of an unknown texture, for the Cramér–Rao bound; [`assumed_texture`] has that of pictures which are
-//! not sampled.
+//! of an unknown texture, for the Cramér–Rao bound; [`assumed_texture`] has that of pictures which
+//! are not sampled.
 
 pub mod assumed_texture;
 pub mod block_sums;

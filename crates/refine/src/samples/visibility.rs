@@ -59,8 +59,8 @@ impl Exclusions<'_> {
 /// The observations of a set of frames: every tile with at least two observers, one of them active.
 ///
 /// A frame either observes a whole tile, with the ring that its gradients need, or not at all. So
-/// every sample of a tile averages the same frames, which see it about equally sharp. The set stays constant while the poses move, so
-/// that costs before and after a step are of the same samples.
+/// every sample of a tile averages the same frames, which see it about equally sharp. The set stays
+/// constant while the poses move, so that costs before and after a step are of the same samples.
 #[derive(Clone, Debug, Default)]
 pub struct Visibility {
     /// Tiles, block by block.

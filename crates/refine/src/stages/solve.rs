@@ -158,9 +158,9 @@ fn solve<'a>(
     Ok(solution)
 }
 
-/// Corrects the light by the poses of a solve: a lamp is looked for, if there may be one, and frames
-/// that had to be compared by their contrast are compared in its light from now on. Their exposures
-/// are others then, so the solve is repeated.
+/// Corrects the light by the poses of a solve: a lamp is looked for, if there may be one, and
+/// frames that had to be compared by their contrast are compared in its light from now on. Their
+/// exposures are others then, so the solve is repeated.
 fn correct_light(
     plan: &SolvePlan,
     setup: &Setup,

@@ -1,4 +1,4 @@
-//! Correction of the camera's shading by frames that see the same wall in different parts of the
+//! Correction of the camera's light by frames that see the same wall in different parts of the
 //! picture.
 //!
 //! The mean over all frames shows the lamp and the lens ([`Shading::of_mean`]) up to what is left
@@ -8,7 +8,10 @@
 //! ([`tunnelstitch_photometry`]): an observation is the mean value z of a tile in a frame by the
 //! present bias and the present factor `f = a_i V`.
 //!
-//! Only the shading is taken over; the solves that follow estimate gains and biases themselves.
+//! A lamp that moves with the camera lights the wall by its distance, and so by the frame's pose
+//! ([`Lamp`]): what frames off the axis show tells it from a shading, once their poses are good.
+//!
+//! Only the light is taken over; the solves that follow estimate gains and biases themselves.
 
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
@@ -82,8 +85,9 @@ pub fn correct_once(
 }
 
 /// Looks for a lamp that moves with the camera, at the frames' present poses, and takes it over if
-/// frames agree better with one beside a shading than with a shading alone, by more than chance, and
-/// to less than the noise of a pixel. Returns that noise, 1-σ in grey levels, if there is a lamp.
+/// frames agree better with one beside a shading than with a shading alone, by more than chance,
+/// and to less than the noise of a pixel. Returns that noise, 1-σ in grey levels; None if there is
+/// no lamp.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -244,7 +248,7 @@ impl LightModel {
 struct TileView {
     /// The frame, counted from the first that the light is estimated from.
     frame: usize,
-    /// Where its centre appears, pixels of the full-size frame.
+    /// Its centre, pixels of the full-size frame.
     pixel: Vector2<f64>,
     /// Its centre, metres.
     x_w: Vector3<f64>,
@@ -257,7 +261,7 @@ struct TileView {
 }
 
 impl TileView {
-    /// What it says of the light beside `light`, seen from `pose`.
+    /// Its observation of the light beside `light`, seen from `pose`.
     fn observation(&self, light: &LightModel, pose: &Pose) -> Option<Observation> {
         let Self { x_w, normal, .. } = self;
         let of_lamp = |lamp: &Lamp| {
@@ -346,8 +350,13 @@ impl TileViews {
 mod tests {
     use super::*;
     use crate::test_scene::{frame_states, independent_prior, test_context};
+    use nalgebra::Vector6;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
     use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
     use tunnelstitch_core::test_wall::{TestWall, waves};
+    use tunnelstitch_geometry::surface::Surface;
     use tunnelstitch_geometry::trajectory::spiral;
 
     /// Five turns past a wall in a light that depends on the pixel, and exposures that
@@ -377,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lamp_is_found_where_frames_overlap() {
+    fn a_shading_is_found_where_frames_overlap() {
         let lamp = |u: f64, v: f64| (1.0 + 0.8 * ((u - 0.6).powi(2) + (v - 0.4).powi(2))).powi(-2);
         let found = corrected(lamp).unwrap();
         let middle = found(0.5, 0.5) / lamp(0.5, 0.5);
@@ -391,5 +400,56 @@ mod tests {
     #[test]
     fn even_light_is_left_alone() {
         assert!(corrected(|_, _| 1.0).is_none());
+    }
+
+    /// Five turns off the axis past a wall that a lamp lights, with noise; the lamp that is found.
+    fn found_lamp(lamp: Option<Lamp>) -> Option<Vector3<f64>> {
+        let mut wall = TestWall::ring(waves);
+        let planned = spiral(60, 0.05, 30f64.to_radians()).into_iter().enumerate();
+        let jitter = |k: usize, n: usize| 0.08 * ((1.3 + 0.7 * n as f64) * k as f64).sin();
+        let off_axis =
+            planned.map(|(k, plan)| plan.retract(&Vector6::from_fn(|n, _| jitter(k, n))));
+        wall.poses = off_axis.collect();
+        let light = |pose: &Pose, u: usize, v: usize| -> f64 {
+            let ray = wall.camera.ray(u as f64, v as f64).unwrap();
+            let hit = wall.circle.hit(&pose.t_wc, &(pose.r_wc * ray)).unwrap();
+            let normal = wall.circle.frame(hit.wall).normal();
+            let log = lamp
+                .as_ref()
+                .map(|lamp| lamp.log_at(pose, &hit.x_w, &normal));
+            log.map_or(1.0, f64::exp)
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let pictures = wall
+            .frames()
+            .into_iter()
+            .zip(&wall.poses)
+            .map(|(frame, pose)| {
+                let (w, h) = (frame.width(), frame.height());
+                let lit = frame.data().iter().enumerate().map(|(n, value)| {
+                    let noise: f64 = StandardNormal.sample(&mut rng);
+                    (0.5 * light(pose, n % w, n / w) * f64::from(*value) + noise) as f32
+                });
+                Pyramid::new(GreyImage::new(w, h, lit.collect()), 1)
+            });
+        let frames = FrameCache::of_pyramids(pictures.collect());
+        let prior = independent_prior(&wall.poses);
+        let context = test_context(&wall, &frames, &prior);
+        let states = frame_states(&wall.poses);
+        let noise = find_lamp(&context, &RefineOptions::default(), &states).unwrap()?;
+        assert!((noise - 1.0).abs() < 0.3, "{noise}");
+        frames.lamp_m().map(Vector3::from)
+    }
+
+    #[test]
+    fn a_lamp_is_told_from_a_shading_by_frames_off_the_axis() {
+        let lamp = Lamp {
+            position: Vector3::new(0.1, -0.05, 0.08),
+            ..Lamp::at_camera(3.0)
+        };
+        let found = found_lamp(Some(lamp)).unwrap();
+        let error_m = (found - lamp.position * lamp.reach_m).norm();
+        assert!(error_m < 0.03, "{found:?}");
+        assert_eq!(found_lamp(None), None);
     }
 }
