@@ -99,3 +99,36 @@ fn millimetres(value: f64) -> String {
     let decimals = (1.0 - value.abs().max(1e-6).log10().floor()).clamp(0.0, 4.0);
     format!("{value:.0$}", decimals as usize)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(node_sigma_mm: f64, half_advance_sigma_mm: f64) -> DeformationCheck {
+        DeformationCheck {
+            node_m: 0.6,
+            node_sigma_mm,
+            prior_sigma_mm: 10.0,
+            harmonic_sigma_mm: vec![0.034],
+            half_advance_sigma_mm: Some(half_advance_sigma_mm),
+        }
+    }
+
+    #[test]
+    fn half_the_advance_is_advised_where_it_helps() {
+        assert_eq!(check(0.2, 0.1).warning(), None);
+        let helps = check(8.0, 0.32).warning().unwrap();
+        assert!(helps.contains("± 8.0 mm of ± 10 mm"), "{helps}");
+        assert!(helps.contains("with half the advance per turn"), "{helps}");
+        assert!(helps.ends_with("± 0.32 mm"), "{helps}");
+        let useless = check(8.0, 7.0).warning().unwrap();
+        assert!(!useless.contains("half the advance"), "{useless}");
+    }
+
+    #[test]
+    fn figures_have_two_digits() {
+        let said = check(0.2, 0.1).sentence();
+        assert!(said.contains("± 0.20 mm at nodes 0.60 m apart"), "{said}");
+        assert!(said.contains("ovality to ± 0.034 mm"), "{said}");
+    }
+}

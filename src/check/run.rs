@@ -161,15 +161,13 @@ mod tests {
             advance_m: 0.3,
             ..small()
         });
-        let deformation = far.deformation.unwrap();
+        let deformation = far.deformation.as_ref().unwrap();
         assert!(
             deformation.node_sigma_mm > 2.0 * near.node_sigma_mm,
             "{deformation:?} {near:?}"
         );
         let closer = deformation.half_advance_sigma_mm.unwrap();
         assert!(closer < 0.7 * deformation.node_sigma_mm, "{deformation:?}");
-        let said = far.warnings.join("\n");
-        assert!(said.contains("half the advance per turn"), "{said}");
     }
 
     /// A masked shaft and ignored parts of the wall reduce the overlap.

@@ -50,10 +50,10 @@ mod tests {
     #[test]
     fn information_is_that_of_sampled_texture_with_equal_slopes() {
         let ring = Ring::new(0.0);
-        // Of `waves` on a perimeter of 6π m, along s and h: a wave of amplitude a has a/√2.
-        let along_s = (50.0f64 * 20.0 / 3.0).hypot(30.0 * 4.0 / 3.0);
+        // Of `waves`, along s and h: a wave of amplitude a has a/√2.
+        let per_metre = std::f64::consts::TAU / ring.wall.circle.perimeter_m();
+        let along_s = per_metre * (50.0f64 * 20.0).hypot(30.0 * 4.0);
         let along_h = (50.0f64 * 3.0).hypot(30.0 * 13.0);
-        assert!((ring.wall.circle.perimeter_m() - 6.0 * std::f64::consts::PI).abs() < 1e-9);
         let texture = AssumedTexture {
             slope_grey_per_m: 0.5 * along_s.hypot(along_h),
             noise_grey: 1.0,

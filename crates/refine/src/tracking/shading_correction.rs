@@ -445,7 +445,7 @@ mod tests {
     fn a_lamp_is_told_from_a_shading_by_frames_off_the_axis() {
         let lamp = Lamp {
             position: Vector3::new(0.1, -0.05, 0.08),
-            ..Lamp::at_camera(3.0)
+            ..Lamp::at_camera(1.0)
         };
         let found = found_lamp(Some(lamp)).unwrap();
         let error_m = (found - lamp.position * lamp.reach_m).norm();
