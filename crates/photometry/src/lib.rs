@@ -21,6 +21,9 @@
 //!
 //! `ln z_i(x) = s(x) + α_i + β_i/(f_i m_i) + Σ_k c_k B_k(u_i(x)) + noise`.
 //!
+//! A lamp that moves with the camera adds the changes of its position times the derivatives of its
+//! light there ([`tunnelstitch_core::frames::Lamp::log_falloff`]), as further terms `c_k B_k`.
+//!
 //! The regressor of β must be the model value `1/(f_i m_i)` by the solution so far. With the
 //! measured z in place of m the same noise would be on both sides of the equation (errors in
 //! variables) and look like a bias: for noise of relative size ε, on a wall whose logarithm varies
@@ -54,7 +57,7 @@
 //! | m | `model` | z without bias and noise by the solution so far | grey levels of the wall |
 //! | α | `log_gains` | logarithm of the gain | 1 |
 //! | β | `biases` | bias | grey levels of the frame |
-//! | c_k, B_k | `shading`, `terms` | coefficients and terms of the logarithmic shading | 1 |
+//! | c_k, B_k | `shading`, `lamp`, `terms` | coefficients and terms of the logarithmic light | 1 |
 //!
 //! | part | file |
 //! | --- | --- |

@@ -15,7 +15,7 @@ type Block = [[f64; FRAME_UNKNOWNS]; FRAME_UNKNOWNS];
 pub type LightMatrix = SMatrix<f64, LIGHT_TERMS, LIGHT_TERMS>;
 
 /// The normal equations `N x = g`, a block for each pair of frames that overlap and a border for
-/// the shading.
+/// the light.
 ///
 /// With the rows `r_i` of a wall point, their logarithms `y_i` and weights w, eliminating s leaves
 ///
@@ -26,9 +26,9 @@ pub type LightMatrix = SMatrix<f64, LIGHT_TERMS, LIGHT_TERMS>;
 pub struct NormalEquations {
     /// Of each frame i, its blocks with frames j ≥ i, in ascending order of j.
     pairs: Vec<Vec<(usize, Block)>>,
-    /// Of each unknown of a frame, its entries with the shading's.
+    /// Of each unknown of a frame, its entries with the light's.
     border: Vec<[f64; LIGHT_TERMS]>,
-    /// Of the shading's unknowns, the lower triangle.
+    /// Of the light's unknowns, the lower triangle.
     corner: [[f64; LIGHT_TERMS]; LIGHT_TERMS],
     /// Right side g.
     right: Vec<f64>,
@@ -54,7 +54,7 @@ impl NormalEquations {
 
     /// Adds a wall point; `total`: sum of the `weights`, above 0.
     pub fn add(&mut self, point: &[Row], weights: &[f64], total: f64) {
-        let shading = self.border.len();
+        let light = self.border.len();
         // Terms and logarithms relative to their weighted mean: the same as eliminating s.
         let mut mean = [0.0; LIGHT_TERMS];
         let mut mean_log = 0.0;
@@ -68,7 +68,7 @@ impl NormalEquations {
             let log = one.log - mean_log;
             let terms: [f64; LIGHT_TERMS] = std::array::from_fn(|k| one.terms[k] - mean[k]);
             for (k, term) in terms.iter().enumerate() {
-                self.right[shading + k] += w * term * log;
+                self.right[light + k] += w * term * log;
                 for (entry, other) in self.corner[k].iter_mut().zip(&terms[..=k]) {
                     *entry += w * term * other;
                 }
@@ -133,8 +133,8 @@ impl NormalEquations {
         let n = self.right.len();
         let matrix = SparseColMat::try_new_from_triplets(n, n, &self.lower(priors, variance));
         let factor = matrix.ok()?.sp_cholesky(Side::Lower).ok()?;
-        let shading = self.border.len();
-        let x = factor.solve(&Col::from_fn(n, |k| match k.checked_sub(shading) {
+        let light = self.border.len();
+        let x = factor.solve(&Col::from_fn(n, |k| match k.checked_sub(light) {
             Some(term) => self.right[k] - self.prior(priors, variance, k) * known[term],
             None => self.right[k],
         }));

@@ -51,17 +51,12 @@ impl Observation {
     }
 
     /// The observation with the derivatives of the logarithm of the light by the lamp's unknowns
-    /// ([`tunnelstitch_core::frames::Lamp::terms`]); without, there is no lamp.
+    /// ([`tunnelstitch_core::frames::Lamp::log_falloff`]); without, there is no lamp.
     pub fn with_lamp(self, terms: [f64; LAMP_TERMS]) -> Self {
         Self {
             lamp: terms.map(|term| term as f32),
             ..self
         }
-    }
-
-    /// The observation without a lamp.
-    pub fn without_lamp(&self) -> Self {
-        self.with_lamp([0.0; LAMP_TERMS])
     }
 
     /// Regressors of the light: `B_k`, then the lamp's.

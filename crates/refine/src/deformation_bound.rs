@@ -22,18 +22,18 @@ use crate::parameters::shape::{HARMONIC_ORDERS, ShapeModel, ShapeStep};
 use crate::parameters::shape_limits::FIRST_FINEST_COLUMNS;
 use crate::problem::assumed_texture::AssumedTexture;
 use crate::problem::photometric_problem::PhotometricProblem;
+use crate::problem::set_up::pixel_size_on_wall;
 use crate::samples::sampling::Sampling;
 use crate::stages::begin::begin;
 use crate::stages::setup::Setup;
 use crate::stages::shape;
 use nalgebra::SMatrix;
-use serde::Serialize;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_core::survey::Survey;
 use tunnelstitch_geometry::numerics::median::upper_median;
-use tunnelstitch_geometry::surface::{Footprint, WallPoint, viewing_distance};
+use tunnelstitch_geometry::surface::{Footprint, WallPoint};
 use tunnelstitch_geometry::trajectory::StampedPose;
 
 /// Largest number of frames, from the middle of a survey: five turns of the paper's.
@@ -56,7 +56,7 @@ pub struct PictureTexture {
 }
 
 /// The least uncertainty that the deformation of a wall can be measured with.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DeformationBound {
     /// Distance of the nodes of deformation, metres.
@@ -161,10 +161,12 @@ fn bound_at(
         shape: true,
         ..Sampling::of(0)
     };
+    let poses = initial.iter().map(|stamped| &stamped.pose);
+    let pixel_size_m = pixel_size_on_wall(survey.surface.as_ref(), full, poses);
     let problem = PhotometricProblem::new(&context, sampling, window)?
         .with_shared_parameters()
         .with_assumed_texture(AssumedTexture {
-            slope_grey_per_m: texture.slope_grey_per_px * px_per_metre(survey, initial),
+            slope_grey_per_m: texture.slope_grey_per_px / pixel_size_m,
             // As many pixels as at full size.
             noise_grey: texture.noise_grey / f64::from(1 << level),
         });
@@ -183,15 +185,6 @@ fn bound_at(
     };
     let nodes = Nodes::between(&model, survey, initial);
     Ok(information.bound(&model, &nodes))
-}
-
-/// Median resolution of the wall where frames see it best, full-size pixels per metre.
-fn px_per_metre(survey: &Survey, initial: &[StampedPose]) -> f64 {
-    let range = |stamped: &StampedPose| {
-        viewing_distance(survey.surface.as_ref(), &survey.camera, &stamped.pose).ok()
-    };
-    let median_m = upper_median(initial.iter().filter_map(range).collect());
-    survey.camera.vertical_focal_px() / median_m.unwrap_or(f64::INFINITY)
 }
 
 /// Nodes of the finest lattice.

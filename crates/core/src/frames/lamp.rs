@@ -56,13 +56,13 @@ impl Lamp {
     }
 
     /// `ln L` at the wall point `x_w` with the unit normal `normal`, seen from `pose`, and its
-    /// derivative by the position.
-    fn log_falloff(
+    /// derivatives by [`Lamp::unknowns`].
+    pub fn log_falloff(
         &self,
         pose: &Pose,
         x_w: &Vector3<f64>,
         normal: &Vector3<f64>,
-    ) -> (f64, Vector3<f64>) {
+    ) -> (f64, [f64; TERMS]) {
         let r = self.reach_m;
         let w = x_w - pose.t_wc - pose.r_wc * (self.position * r);
         let rho = w.norm().max(f64::MIN_POSITIVE);
@@ -71,18 +71,13 @@ impl Lamp {
         let slope = w * (3.0 / (rho * rho)) - normal / (cosine * rho).copysign(across);
         (
             (cosine * r * r / (rho * rho)).ln(),
-            pose.r_wc.inverse() * slope * r,
+            (pose.r_wc.inverse() * slope * r).into(),
         )
     }
 
     /// `ln L` at a wall point.
     pub fn log_at(&self, pose: &Pose, x_w: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
         self.log_falloff(pose, x_w, normal).0
-    }
-
-    /// Derivatives of `ln L` at a wall point by [`Lamp::unknowns`].
-    pub fn terms(&self, pose: &Pose, x_w: &Vector3<f64>, normal: &Vector3<f64>) -> [f64; TERMS] {
-        self.log_falloff(pose, x_w, normal).1.into()
     }
 }
 
@@ -159,7 +154,7 @@ mod tests {
         let (lamp, pose) = (lamp(), pose());
         let x_w = Vector3::new(1.0, 2.5, 8.0f64.sqrt());
         let normal = Vector3::new(1.0, 0.0, 8.0f64.sqrt()) / 3.0;
-        let terms = lamp.terms(&pose, &x_w, &normal);
+        let (_, terms) = lamp.log_falloff(&pose, &x_w, &normal);
         for (k, term) in terms.iter().enumerate() {
             let moved = |step: f64| {
                 let mut delta = [0.0; TERMS];

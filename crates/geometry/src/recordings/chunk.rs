@@ -7,6 +7,17 @@ use std::io::{self, Read};
 /// megabyte, or of one message that is larger: an image of 16 bits and 100 megapixels has 600 MB.
 pub const MAX_CHUNK_BYTES: u64 = 1 << 30;
 
+/// The unpacked size of a chunk that states so many bytes.
+///
+/// # Errors
+/// More than are read, in words.
+pub fn unpacked_size(stated: u64) -> Result<usize, String> {
+    let size = usize::try_from(stated).ok();
+    size.filter(|_| stated <= MAX_CHUNK_BYTES).ok_or_else(|| {
+        format!("a chunk states {stated} bytes, more than the {MAX_CHUNK_BYTES} that are read")
+    })
+}
+
 /// The ways that chunks are packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compression {

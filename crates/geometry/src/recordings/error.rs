@@ -34,6 +34,14 @@ impl RecordingError {
         }
     }
 
+    /// An error of the operating system.
+    pub(super) fn unreadable(path: &Path, source: std::io::Error) -> Self {
+        Self::Read {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
     /// The problem, without the name of the file.
     pub fn reason(&self) -> String {
         match self {

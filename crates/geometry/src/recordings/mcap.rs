@@ -11,7 +11,7 @@
 //! Other records are skipped. All numbers are little-endian. Source: the MCAP format
 //! specification, mcap.dev.
 
-use super::chunk::{Compression, MAX_CHUNK_BYTES};
+use super::chunk::{Compression, unpacked_size};
 use super::error::RecordingError;
 use super::fields::Fields;
 use super::index::Index;
@@ -133,12 +133,7 @@ impl Walk {
 fn read_chunk(content: &[u8], position: u64) -> Result<(Chunk, &[u8], u32), String> {
     let mut fields = Fields::packed(content);
     fields.take(8 + 8)?;
-    let unpacked_bytes = fields.u64()?;
-    if unpacked_bytes > MAX_CHUNK_BYTES {
-        return Err(format!(
-            "a chunk states {unpacked_bytes} bytes, more than the {MAX_CHUNK_BYTES} that are read"
-        ));
-    }
+    let unpacked_bytes = unpacked_size(fields.u64()?)?;
     let crc = fields.u32()?;
     let compression = Compression::of(fields.text()?)?;
     let bytes = usize::try_from(fields.u64()?).map_err(|error| error.to_string())?;
@@ -147,8 +142,7 @@ fn read_chunk(content: &[u8], position: u64) -> Result<(Chunk, &[u8], u32), Stri
     let chunk = Chunk {
         position: position + start as u64,
         bytes,
-        // It is limited above.
-        unpacked_bytes: unpacked_bytes as usize,
+        unpacked_bytes,
         compression,
     };
     Ok((chunk, packed, crc))

@@ -23,10 +23,7 @@ impl RecordFile {
     /// # Errors
     /// An unreadable file.
     pub fn open(path: &Path, remedy: &'static str) -> Result<Self, RecordingError> {
-        let unreadable = |source| RecordingError::Read {
-            path: path.to_owned(),
-            source,
-        };
+        let unreadable = |source| RecordingError::unreadable(path, source);
         let file = open_regular(path).map_err(unreadable)?;
         Ok(Self {
             path: path.to_owned(),
@@ -60,10 +57,7 @@ impl RecordFile {
         }
         let mut bytes = Vec::new();
         let read = (&mut self.reader).take(count).read_to_end(&mut bytes);
-        read.map_err(|source| RecordingError::Read {
-            path: self.path.clone(),
-            source,
-        })?;
+        read.map_err(|source| RecordingError::unreadable(&self.path, source))?;
         if bytes.len() as u64 != count {
             return Err(self.cut_off());
         }
@@ -81,12 +75,7 @@ impl RecordFile {
         match self.reader.read_exact(&mut bytes) {
             Ok(()) => {}
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Err(self.cut_off()),
-            Err(source) => {
-                return Err(RecordingError::Read {
-                    path: self.path.clone(),
-                    source,
-                });
-            }
+            Err(source) => return Err(RecordingError::unreadable(&self.path, source)),
         }
         self.at += N as u64;
         Ok(bytes)
@@ -100,10 +89,7 @@ impl RecordFile {
         self.check_room(count)?;
         let step = i64::try_from(count).map_err(|_| self.cut_off())?;
         let skipped = self.reader.seek_relative(step);
-        skipped.map_err(|source| RecordingError::Read {
-            path: self.path.clone(),
-            source,
-        })?;
+        skipped.map_err(|source| RecordingError::unreadable(&self.path, source))?;
         self.at += count;
         Ok(())
     }

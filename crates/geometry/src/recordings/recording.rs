@@ -14,14 +14,17 @@ use std::path::{Path, PathBuf};
 
 /// True for a file whose name ends as those of recordings do.
 pub fn is_recording(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default();
-    extension.eq_ignore_ascii_case("mcap") || is_bag(path)
+    ends_in(path, "mcap") || is_bag(path)
 }
 
 /// True for a file whose name ends as those of bags do.
 fn is_bag(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default();
-    extension.eq_ignore_ascii_case("bag")
+    ends_in(path, "bag")
+}
+
+/// True for a file of this extension, in whatever case.
+fn ends_in(path: &Path, extension: &str) -> bool {
+    (path.extension()).is_some_and(|own| own.eq_ignore_ascii_case(extension))
 }
 
 /// A recording, whose messages are read from their places in the file.
@@ -118,10 +121,8 @@ impl Recording {
     /// # Errors
     /// A file that has become unreadable.
     pub fn reader(&self) -> Result<MessageReader<'_>, RecordingError> {
-        let file = open_regular(&self.path).map_err(|source| RecordingError::Read {
-            path: self.path.clone(),
-            source,
-        })?;
+        let file = open_regular(&self.path);
+        let file = file.map_err(|source| RecordingError::unreadable(&self.path, source))?;
         Ok(MessageReader {
             recording: self,
             file,
@@ -162,10 +163,7 @@ impl MessageReader<'_> {
             let what = format!("{what}; the file has changed since it was opened");
             RecordingError::content(path, what)
         };
-        let unreadable = |source| RecordingError::Read {
-            path: path.clone(),
-            source,
-        };
+        let unreadable = |source| RecordingError::unreadable(path, source);
         match message.place {
             Place::File { position, bytes } => {
                 let bytes = read_at(&mut self.file, position, bytes).map_err(unreadable)?;

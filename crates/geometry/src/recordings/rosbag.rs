@@ -12,7 +12,7 @@
 //! Other records are skipped. All numbers are little-endian. Source: the ROS wiki,
 //! "Bags/Format/2.0".
 
-use super::chunk::{Compression, MAX_CHUNK_BYTES};
+use super::chunk::{Compression, unpacked_size};
 use super::error::RecordingError;
 use super::fields::Fields;
 use super::index::Index;
@@ -97,15 +97,10 @@ impl Walk {
     fn take_chunk(&mut self, header: &[u8], packed: &[u8], position: u64) -> Result<(), String> {
         let name = String::from_utf8_lossy(field(header, "compression")?);
         let stated = Fields::packed(field(header, "size")?).u32()?;
-        if u64::from(stated) > MAX_CHUNK_BYTES {
-            return Err(format!(
-                "a chunk states {stated} bytes, more than the {MAX_CHUNK_BYTES} that are read"
-            ));
-        }
         let chunk = Chunk {
             position,
             bytes: packed.len(),
-            unpacked_bytes: stated as usize,
+            unpacked_bytes: unpacked_size(stated.into())?,
             compression: Compression::of(&name)?,
         };
         let unpacked = chunk.compression.unpack(packed, chunk.unpacked_bytes)?;

@@ -119,8 +119,8 @@ impl<'a> PhotometricProblem<'a> {
         let gauge_slot = active
             .clone()
             .position(|frame| compared[frame - participants.start]);
-        let pixel_size_m =
-            pixel_size_on_wall(context.surface.as_ref(), &camera, posed.iter().flatten());
+        let poses = posed.iter().flatten().map(|frame| &frame.pose);
+        let pixel_size_m = pixel_size_on_wall(context.surface.as_ref(), &camera, poses);
         let density = density.max(min_density(camera.height));
         let grid = WallGrid::new(context.surface.as_ref(), pixel_size_m, density);
         let images = FrameImages {

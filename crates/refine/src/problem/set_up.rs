@@ -14,6 +14,7 @@ use std::ops::Range;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{Surface, mean_radius_m, viewing_distance};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Least number of wall samples over the height of an image. Of whole tiles, a strip of half a tile
 /// with its ring is lost at either border, together a ninth of this height.
@@ -112,10 +113,10 @@ pub fn min_density(rows: u32) -> f64 {
 pub fn pixel_size_on_wall<'p>(
     surface: &dyn Surface,
     camera: &Camera,
-    posed: impl Iterator<Item = &'p PosedFrame>,
+    poses: impl Iterator<Item = &'p Pose>,
 ) -> f64 {
-    let mut ranges: Vec<f64> = posed
-        .filter_map(|frame| viewing_distance(surface, camera, &frame.pose).ok())
+    let mut ranges: Vec<f64> = poses
+        .filter_map(|pose| viewing_distance(surface, camera, pose).ok())
         .collect();
     ranges.sort_unstable_by(f64::total_cmp);
     let median = ranges.get(ranges.len() / 2);

@@ -9,12 +9,14 @@
 //! prior predicts a pose, the correlation search compares the unwrapped frame with a reference
 //! mosaic of its neighbours, and the hypotheses are refined and chosen from. Sliding windows keep
 //! the error bounded. While shading or camera are only roughly known, tracking alternates with
-//! their calibration.
+//! their calibration. [`lamp_search`] finds a lamp once poses are good.
 
 pub mod alternating_calibration;
 pub mod candidate;
 pub mod correlation_search;
 pub mod correlator;
+pub mod lamp_search;
+pub mod light_model;
 pub mod mosaic_grid;
 pub mod ncc_score;
 pub mod neighbours;
@@ -27,6 +29,7 @@ pub mod search_across;
 pub mod search_along;
 pub mod search_grid;
 pub mod shading_correction;
+pub mod tile_views;
 pub mod track;
 pub mod unwrapped_frame;
 pub mod windows;

@@ -1,0 +1,149 @@
+//! Search for a lamp that moves with the camera.
+//!
+//! The lamp lights the wall by its distance, and so by the frame's pose ([`Lamp`]): what frames off
+//! the axis show tells it from a shading that all have in common, once their poses are good.
+
+use crate::model::context::EstimationContext;
+use crate::model::frame_states::FrameStates;
+use crate::model::problem_error::ProblemError;
+use crate::model::significance::chi_squared_bounds;
+use crate::options::RefineOptions;
+use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
+use crate::tracking::light_model::LightModel;
+use crate::tracking::tile_views::{TileViews, calibrated_frames};
+use tunnelstitch_core::frames::{LAMP_TERMS, Lamp, Light, noise_sigma};
+use tunnelstitch_geometry::numerics::median::upper_median;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::mean_radius_m;
+use tunnelstitch_photometry::PhotometricCalibration;
+
+/// Looks for a lamp that moves with the camera, at the frames' present poses, and takes it over if
+/// frames agree better with one beside a shading than with a shading alone, by more than chance,
+/// and to less than the noise of a pixel. Returns that noise, 1-σ in grey levels; None if there is
+/// no lamp.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn find_lamp(
+    context: &EstimationContext,
+    options: &RefineOptions,
+    frames: &FrameStates,
+) -> Result<Option<f64>, ProblemError> {
+    let before = context.frames.light();
+    let is_normalised = matches!(before, Light::Normalised);
+    let dark = LightModel::present(context);
+    if is_normalised {
+        context.frames.set_light(Light::Even);
+    }
+    let views = TileViews::observe(context, options, frames)?;
+    let noise = median_noise(context)?;
+    let lamp = lamp_beside(dark, &views, context, options);
+    match lamp.filter(|(_, found)| found.variance.sqrt() < noise) {
+        Some((light, _)) => {
+            light.take_over(context, frames);
+            Ok(Some(noise))
+        }
+        None => {
+            // Otherwise it has not changed, and the frames are kept as they are.
+            if is_normalised {
+                context.frames.set_light(before);
+            }
+            Ok(None)
+        }
+    }
+}
+
+/// The lamp by which frames agree best, with its calibration; None if they do as well without, in
+/// a light as `dark`.
+fn lamp_beside(
+    dark: LightModel,
+    views: &TileViews,
+    context: &EstimationContext,
+    options: &RefineOptions,
+) -> Option<(LightModel, PhotometricCalibration)> {
+    let (_, without) = dark.refined(views)?;
+    let at_camera = LightModel {
+        lamp: Some(Lamp::at_camera(mean_radius_m(context.surface.as_ref()))),
+        ..dark
+    };
+    let mut lit = at_camera.refined(views)?;
+    for _ in 1..MAX_TRACKING_ITERATIONS {
+        lit = lit.0.refined(views)?;
+    }
+    let gain = views.independent() * (without.variance / lit.1.variance).ln();
+    let (_, least) = chi_squared_bounds(2.0 * options.false_alarm_rate, LAMP_TERMS as f64)?;
+    (gain > least).then_some(lit)
+}
+
+/// Median noise of the frames that the light is estimated from, 1-σ in grey levels.
+fn median_noise(context: &EstimationContext) -> Result<f64, ProblemError> {
+    let frames: Vec<usize> = calibrated_frames(context.frames.frames()).collect();
+    let noises = frames.par_map(|k| Ok(noise_sigma(context.frames.get(*k)?.level(0))));
+    let noises: Vec<Option<f64>> = noises.into_iter().collect::<Result<_, ProblemError>>()?;
+    Ok(upper_median(noises.into_iter().flatten().collect()).unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scene::{frame_states, independent_prior, test_context};
+    use nalgebra::{Vector3, Vector6};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+    use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
+    use tunnelstitch_core::test_wall::{TestWall, waves};
+    use tunnelstitch_geometry::surface::Surface;
+    use tunnelstitch_geometry::trajectory::{Pose, spiral};
+
+    /// Five turns off the axis past a wall that a lamp lights, with noise; the lamp that is found.
+    fn found_lamp(lamp: Option<Lamp>) -> Option<Vector3<f64>> {
+        let mut wall = TestWall::ring(waves);
+        let planned = spiral(60, 0.05, 30f64.to_radians()).into_iter().enumerate();
+        let jitter = |k: usize, n: usize| 0.08 * ((1.3 + 0.7 * n as f64) * k as f64).sin();
+        let off_axis =
+            planned.map(|(k, plan)| plan.retract(&Vector6::from_fn(|n, _| jitter(k, n))));
+        wall.poses = off_axis.collect();
+        let light = |pose: &Pose, u: usize, v: usize| -> f64 {
+            let ray = wall.camera.ray(u as f64, v as f64).unwrap();
+            let hit = wall.circle.hit(&pose.t_wc, &(pose.r_wc * ray)).unwrap();
+            let normal = wall.circle.frame(hit.wall).normal();
+            let log = lamp
+                .as_ref()
+                .map(|lamp| lamp.log_at(pose, &hit.x_w, &normal));
+            log.map_or(1.0, f64::exp)
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let pictures = wall
+            .frames()
+            .into_iter()
+            .zip(&wall.poses)
+            .map(|(frame, pose)| {
+                let (w, h) = (frame.width(), frame.height());
+                let lit = frame.data().iter().enumerate().map(|(n, value)| {
+                    let noise: f64 = StandardNormal.sample(&mut rng);
+                    (0.5 * light(pose, n % w, n / w) * f64::from(*value) + noise) as f32
+                });
+                Pyramid::new(GreyImage::new(w, h, lit.collect()), 1)
+            });
+        let frames = FrameCache::of_pyramids(pictures.collect());
+        let prior = independent_prior(&wall.poses);
+        let context = test_context(&wall, &frames, &prior);
+        let states = frame_states(&wall.poses);
+        let noise = find_lamp(&context, &RefineOptions::default(), &states).unwrap()?;
+        assert!((noise - 1.0).abs() < 0.3, "{noise}");
+        frames.lamp_m().map(Vector3::from)
+    }
+
+    #[test]
+    fn a_lamp_is_told_from_a_shading_by_frames_off_the_axis() {
+        let lamp = Lamp {
+            position: Vector3::new(0.1, -0.05, 0.08),
+            ..Lamp::at_camera(1.0)
+        };
+        let found = found_lamp(Some(lamp)).unwrap();
+        let error_m = (found - lamp.position * lamp.reach_m).norm();
+        assert!(error_m < 0.03, "{found:?}");
+        assert_eq!(found_lamp(None), None);
+    }
+}
