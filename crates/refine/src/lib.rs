@@ -14,7 +14,7 @@
 //! | [`prescreen`](stages::prescreen) | rejects useless frames; common shading, sensor noise | [`tracking::prescreening`] |
 //! | [`track`](stages::track) | registers one frame after another on the wall that its predecessors show; sliding windows | [`tracking`] |
 //! | [`correct_shading`](stages::correct_shading) | light that moves with the camera, from the overlaps | [`tunnelstitch_photometry`] |
-//! | [`solve`](stages::solve) | all frames together, coarse to fine | [`problem`], [`solver`] |
+//! | [`solve`](stages::solve) | all frames together, at full size | [`problem`], [`solver`] |
 //! | [`validate_pairs`](stages::validate_pairs) | rejects frames that contradict the others | [`validation::pairwise_ncc`] |
 //! | [`repair`](stages::repair) | rejects inconsistent frames, registers them again, resolves aliases | [`validation`] |
 //! | [`solve`](stages::solve), last | full size, dense samples; then jointly with the wall, if asked for | [`joint`] |

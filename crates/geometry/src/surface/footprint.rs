@@ -173,6 +173,21 @@ impl Footprint {
         self.widened(pixel_m + 0.02 * span_m)
     }
 
+    /// The point in the middle of the box.
+    pub fn middle(&self) -> Self {
+        let middle = |from: f64, to: f64| 0.5 * (from + to);
+        let (s_m, h_m) = (
+            middle(self.s_min_m, self.s_max_m),
+            middle(self.h_min_m, self.h_max_m),
+        );
+        Self {
+            s_min_m: s_m,
+            s_max_m: s_m,
+            h_min_m: h_m,
+            h_max_m: h_m,
+        }
+    }
+
     /// The box enlarged by `margin_m` on every side, metres.
     pub fn widened(&self, margin_m: f64) -> Self {
         Self {

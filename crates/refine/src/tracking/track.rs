@@ -25,6 +25,10 @@ use crate::tracking::windows::{LONG_WINDOW_STRIDE, solve_long_window, solve_slid
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::surface::Footprint;
 
+/// Sliding windows in which a frame is solved for, at most: the longer windows are, the fewer of
+/// them, so that the time of tracking is proportional to the number of frames.
+const WINDOW_SOLVES_PER_FRAME: usize = 6;
+
 /// Frames that are tracked one after another.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Tracking {
@@ -42,6 +46,10 @@ pub struct Tracking {
     successes: usize,
     /// The effort that is left for registrations.
     effort: Effort,
+    /// Frames tracked since the last sliding window.
+    frames_since_window: usize,
+    /// True if the pose of the last tracked frame was reliable.
+    was_reliable: bool,
 }
 
 impl Tracking {
@@ -59,6 +67,8 @@ impl Tracking {
             attempts: 0,
             successes: 0,
             effort: Effort::default(),
+            frames_since_window: 0,
+            was_reliable: true,
         }
     }
 
@@ -119,10 +129,19 @@ impl Tracking {
         // that was tracked without it, and the drift in between may be many pixels.
         let closes_turn = first < self.earliest_overlap;
         self.earliest_overlap = first;
-        let drifted = closes_turn || !is_reliable;
+        self.frames_since_window += 1;
+        let stride = options
+            .window_stride
+            .max((k - first) / WINDOW_SOLVES_PER_FRAME);
+        let is_due = self.frames_since_window >= stride || self.is_complete();
+        // A window that did not help when reliability was lost does not help one frame later.
+        let has_become_unreliable = self.was_reliable && !is_reliable;
+        self.was_reliable = is_reliable;
         if k > 0 {
-            if drifted || k.is_multiple_of(options.window_stride) || self.is_complete() {
+            if closes_turn || has_become_unreliable || is_due {
+                let drifted = closes_turn || !is_reliable;
                 solve_sliding_window(context, options, first, drifted, &mut self.states)?;
+                self.frames_since_window = 0;
             }
             if k.is_multiple_of(LONG_WINDOW_STRIDE) {
                 solve_long_window(context, options, &mut self.states)?;

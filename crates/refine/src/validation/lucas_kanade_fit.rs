@@ -25,6 +25,17 @@ pub struct TemplateSample {
     pub patch: usize,
 }
 
+/// A sample of the template with another frame's grey value there.
+pub struct SharedSample<'t> {
+    /// The sample.
+    pub sample: &'t TemplateSample,
+    /// The other frame's grey value.
+    pub value: f32,
+    /// Share of the area of the template's pixel that the frame has there that resolves less of the
+    /// wall: the weight by which a pixel counts once, however far away it looks.
+    pub pixels: f32,
+}
+
 /// Unknowns of a step.
 const UNKNOWNS: usize = 8;
 
@@ -36,7 +47,7 @@ pub struct AffineFit {
     right: SVector<f64, UNKNOWNS>,
     /// Scatter of the scores `Σ g gᵀ`, g the contribution of a patch to the right side.
     scatter: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
-    /// Mean `W = Σ x xᵀ / Σ 1` over the regressors.
+    /// Mean `W = Σ q x xᵀ / Σ q` over the regressors, q the pixels of a sample.
     w: Matrix3<f64>,
     samples: f64,
     /// Number of patches with samples.
@@ -51,7 +62,7 @@ impl AffineFit {
     /// Linearises the samples shared with another frame, in a number of `patches`; `slope_noise`
     /// and `variance`: of the noise of a slope, and of the residuals.
     pub fn new(
-        shared: &[(&TemplateSample, f32)],
+        shared: &[SharedSample],
         patches: usize,
         slope_noise: f64,
         (gain, bias): (f64, f64),
@@ -64,14 +75,18 @@ impl AffineFit {
         let mut right = SVector::<f64, UNKNOWNS>::zeros();
         let mut w = Matrix3::<f64>::zeros();
         let mut weighted = Matrix3::<f64>::zeros();
+        let mut pixels = 0.0;
         let (gain32, bias32) = (gain as f32, bias as f32);
-        for (sample, value) in shared {
-            let e = value - (gain32 * sample.grey + bias32);
-            let omega = sample.influence_weight * Loss::weight(e * e, 1.0 / variance);
+        for one in shared {
+            let sample = one.sample;
+            let e = one.value - (gain32 * sample.grey + bias32);
+            let robust = Loss::weight(e * e, 1.0 / variance);
+            let omega = one.pixels * sample.influence_weight * robust;
             let x = sample.x;
             let regressors = Vector3::from(x.map(f64::from));
             let outer = regressors * regressors.transpose();
-            w += outer;
+            w += f64::from(one.pixels) * outer;
+            pixels += f64::from(one.pixels);
             let (gs, gh) = (gain32 * sample.slope[0], gain32 * sample.slope[1]);
             // I_b(x + d) ≈ a I_a(x) + b − a ∇I_a · δ with δ the remaining displacement, so the row
             // of δ is −a∇I_a.
@@ -112,7 +127,7 @@ impl AffineFit {
             n,
             right,
             scatter,
-            w: w / shared.len() as f64,
+            w: w / pixels,
             samples: shared.len() as f64,
             patches: has_samples.into_iter().filter(|has| *has).count() as f64,
             correlation,

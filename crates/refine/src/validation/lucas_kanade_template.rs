@@ -10,7 +10,7 @@ use crate::thresholds::tracking::{MAX_SOLVE_ITERATIONS, STEP_TOLERANCE_PX};
 use crate::tiles::residual_weighting::robust_correlation;
 use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
 use crate::validation::alignment::Alignment;
-use crate::validation::lucas_kanade_fit::{AffineFit, TemplateSample};
+use crate::validation::lucas_kanade_fit::{AffineFit, SharedSample, TemplateSample};
 use nalgebra::{Vector3, Vector6};
 use tunnelstitch_core::frames::{Pyramid, noise_at_level};
 use tunnelstitch_geometry::camera::Camera;
@@ -49,6 +49,25 @@ impl PosedImage<'_> {
         let image = self.pyramid.level(self.level);
         move |point| sampler.project(point)?.sample_valid(image)
     }
+
+    /// A function from wall points relative to `origin` and the wall's tangents there to the area
+    /// that a piece of the wall has in the frame, over that of the piece seen squarely from
+    /// `distance_m` away, at most 1: `cos β (distance/d)²` at distance d and angle β to the normal.
+    fn pixels_at(
+        &self,
+        origin: &Vector3<f64>,
+        distance_m: f64,
+    ) -> impl Fn(&TemplateSample) -> f32 + use<> {
+        let centre: Vector3<f32> = (self.pose.t_wc - origin).cast();
+        let square_m = (distance_m * distance_m) as f32;
+        move |sample| {
+            let ray = Vector3::from(sample.point) - centre;
+            let normal = Vector3::from(sample.e_s).cross(&Vector3::from(sample.e_h));
+            let square = ray.norm_squared();
+            let cosine = ray.dot(&normal).abs() / (normal.norm_squared() * square).sqrt();
+            (cosine * square_m / square).min(1.0)
+        }
+    }
 }
 
 /// A frame on the wall, to be aligned with others.
@@ -57,8 +76,12 @@ pub struct Template {
     samples: Vec<TemplateSample>,
     /// Number of patches of neighbouring samples.
     patches: usize,
+    /// The samples' pixels in this frame ([`SharedSample::pixels`]).
+    pixels: Vec<f32>,
     /// Width of a pixel of the level on the wall, metres.
     pixel_size_m: f64,
+    /// The distance of the wall where it is, metres.
+    distance_m: f64,
     /// Pixels of full size per pixel of the level.
     scale: f64,
     /// Variance of the noise of a slope.
@@ -127,10 +150,14 @@ impl Template {
             }
         }
         bound_influence(&mut samples);
+        let distance_m = pixel_size_m * image.camera.vertical_focal_px();
+        let pixels_at = image.pixels_at(&origin, distance_m);
         let noise = context.noise * context.noise * noise_at_level(image.level);
         Self {
             origin,
+            pixels: samples.iter().map(pixels_at).collect(),
             samples,
+            distance_m,
             patches: grid.rows.div_ceil(PATCH) * patch_columns,
             pixel_size_m,
             scale: f64::from(1u32 << image.level),
@@ -147,13 +174,14 @@ impl Template {
     /// are right.
     pub fn align(&self, other: &PosedImage) -> Option<Alignment> {
         let grey = other.grey_at(&self.origin);
+        let pixels = other.pixels_at(&self.origin, self.distance_m);
         let mut p = Vector6::<f64>::zeros();
         let mut exposure: Option<(f64, f64)> = None;
         let mut correlation = None;
         let mut first = None;
         let mut result = None;
         for _ in 0..MAX_SOLVE_ITERATIONS {
-            let shared = self.sample_displaced(&p, &grey);
+            let shared = self.sample_displaced(&p, &grey, &pixels);
             let min_samples = (MIN_PIXEL_SHARE * self.samples.len() as f64).max(MIN_SAMPLES);
             if (shared.len() as f64) < min_samples {
                 return None;
@@ -189,10 +217,10 @@ impl Template {
     }
 
     /// Fits the exposure `value = a grey + b` by least squares.
-    fn fit_exposure(&self, shared: &[(&TemplateSample, f32)]) -> (f64, f64) {
+    fn fit_exposure(&self, shared: &[SharedSample]) -> (f64, f64) {
         let mut m = [0.0f64; 5];
-        for (sample, value) in shared {
-            let (x, y) = (f64::from(sample.grey), f64::from(*value));
+        for one in shared {
+            let (x, y) = (f64::from(one.sample.grey), f64::from(one.value));
             for (sum, term) in m.iter_mut().zip([1.0, x, y, x * x, x * y]) {
                 *sum += term;
             }
@@ -209,30 +237,31 @@ impl Template {
         &self,
         p: &Vector6<f64>,
         grey: impl Fn(&[f32; 3]) -> Option<f32>,
-    ) -> Vec<(&TemplateSample, f32)> {
-        let mut shared: Vec<(&TemplateSample, f32)> = Vec::with_capacity(self.samples.len());
+        pixels: impl Fn(&TemplateSample) -> f32,
+    ) -> Vec<SharedSample<'_>> {
+        let mut shared = Vec::with_capacity(self.samples.len());
         let field: [f32; 6] = (p * self.pixel_size_m).cast::<f32>().into();
-        for sample in &self.samples {
+        for (sample, own_pixels) in self.samples.iter().zip(&self.pixels) {
             let x = &sample.x;
             let ds = field[0] * x[0] + field[1] * x[1] + field[2] * x[2];
             let dh = field[3] * x[0] + field[4] * x[1] + field[5] * x[2];
             let point = displaced(&sample.point, &sample.e_s, &sample.e_h, ds, dh);
             if let Some(value) = grey(&point) {
-                shared.push((sample, value));
+                shared.push(SharedSample {
+                    sample,
+                    value,
+                    pixels: pixels(sample).min(*own_pixels),
+                });
             }
         }
         shared
     }
 
     /// Robust variance of the residuals, by their median, grey levels².
-    fn residual_variance(
-        &self,
-        shared: &[(&TemplateSample, f32)],
-        (gain, bias): (f64, f64),
-    ) -> f32 {
+    fn residual_variance(&self, shared: &[SharedSample], (gain, bias): (f64, f64)) -> f32 {
         let mut sizes: Vec<f32> = shared
             .iter()
-            .map(|(sample, value)| (gain as f32 * sample.grey + bias as f32 - value).abs())
+            .map(|one| (gain as f32 * one.sample.grey + bias as f32 - one.value).abs())
             .collect();
         let middle = sizes.len() / 2;
         let (_, median, _) = sizes.select_nth_unstable_by(middle, f32::total_cmp);
@@ -269,8 +298,9 @@ fn displaced(point: &[f32; 3], e_s: &[f32; 3], e_h: &[f32; 3], ds: f32, dh: f32)
 ///
 /// Glints outweigh a faint wall in the former; where most of the wall is flat, the latter is that
 /// of noise.
-fn compute_correlation(shared: &[(&TemplateSample, f32)]) -> f64 {
-    let pairs: Vec<(f32, f32)> = shared.iter().map(|(s, value)| (s.grey, *value)).collect();
+fn compute_correlation(shared: &[SharedSample]) -> f64 {
+    let pair = |one: &SharedSample| (one.sample.grey, one.value);
+    let pairs: Vec<(f32, f32)> = shared.iter().map(pair).collect();
     let mut m = [0.0f64; 6];
     for (x, y) in &pairs {
         let (x, y) = (f64::from(*x), f64::from(*y));
@@ -282,4 +312,45 @@ fn compute_correlation(shared: &[(&TemplateSample, f32)]) -> f64 {
     let spread = (xx - x * x / n) * (yy - y * y / n);
     let of_all = (xy - x * y / n) / spread.sqrt().max(f64::MIN_POSITIVE);
     of_all.max(robust_correlation(&pairs))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scene::with_context;
+    use tunnelstitch_core::test_wall::{TestWall, waves};
+    use tunnelstitch_geometry::surface::Surface;
+    use tunnelstitch_geometry::trajectory::Pose;
+
+    /// From the axis, a radius of wall farther along, at 45°: `cos 45° (1/√2)²`.
+    #[test]
+    fn pixels_are_fewer_far_along_the_tunnel() {
+        let wall = TestWall::ring(waves);
+        let radius_m = wall.circle.perimeter_m() / std::f64::consts::TAU;
+        with_context(&wall, wall.frames(), &wall.poses, |context, _| {
+            let image = PosedImage {
+                context,
+                level: 0,
+                camera: context.camera,
+                pyramid: &context.frames.get(0).unwrap(),
+                pose: &Pose::identity(),
+            };
+            let pixels = image.pixels_at(&Vector3::zeros(), radius_m);
+            let at = |h_m: f64| {
+                let frame = wall.circle.frame(WallPoint { s_m: 0.3, h_m });
+                pixels(&TemplateSample {
+                    point: frame.x_w.cast().into(),
+                    e_s: frame.e_s.cast().into(),
+                    e_h: frame.e_h.cast().into(),
+                    x: [1.0, 0.0, 0.0],
+                    grey: 0.0,
+                    slope: [0.0; 2],
+                    influence_weight: 1.0,
+                    patch: 0,
+                })
+            };
+            assert!((at(0.0) - 1.0).abs() < 1e-5);
+            assert!((at(radius_m) - 0.5f32.powf(1.5)).abs() < 1e-5);
+        });
+    }
 }

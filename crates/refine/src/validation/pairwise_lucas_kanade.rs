@@ -7,9 +7,9 @@
 //!
 //! `d(x) = P (1, s, h)ᵀ`,   P: 2 × 3,
 //!
-//! that minimises `Σ ω (a I_a(x) + b − I_b(x + d(x)))²` at a fine pyramid level, with the exposure
-//! a, b and the biweight ω of [`crate::tiles::residual_weighting::Loss`] for what is not
-//! wall. With N the normal matrix, corrected for the noise in its slopes, and v the variance of the
+//! that minimises `Σ q ω (a I_a(x) + b − I_b(x + d(x)))²` at a fine pyramid level, with the exposure
+//! a, b, the biweight ω of [`crate::tiles::residual_weighting::Loss`] for what is not wall, and the
+//! pixels q of a sample in the frame that resolves less of it. With N the normal matrix, corrected for the noise in its slopes, and v the variance of the
 //! residuals, P has the covariance `v N⁻¹` if they are noise. Glints are not: steeper than a faint
 //! wall, they move with the camera. So the influence of every sample is bounded to that of one a
 //! few times as steep as the median. With g the contributions of n patches of samples to the
