@@ -22,7 +22,7 @@ done
 seed discovery camera 0 <$blender/camera.json
 seed discovery poses 3 <$blender/baseline.tum
 seed poses tum 0 <$blender/baseline.tum
-for name in zstd unchunked ros1; do
+for name in zstd unchunked ros1 transforms; do
     seed recordings "$name.mcap" 0 <"fixtures/recordings/$name.mcap"
 done
 for name in plain bz2; do
