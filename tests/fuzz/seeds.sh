@@ -22,7 +22,7 @@ done
 seed discovery camera 0 <$blender/camera.json
 seed discovery poses 3 <$blender/baseline.tum
 seed poses tum 0 <$blender/baseline.tum
-for name in zstd unchunked ros1; do
+for name in zstd unchunked ros1 transforms; do
     seed recordings "$name.mcap" 0 <"fixtures/recordings/$name.mcap"
 done
 for name in plain bz2; do
@@ -143,7 +143,7 @@ opensfm='[{"cameras": {"v2": {"projection_type": "brown", "width": 640, "height"
  "translation": [1, 2, 3], "camera": "v2"}}, "points": {}}]'
 seed poses opensfm 0 <<<"$opensfm"
 seed calibration opensfm 0 <<<"$opensfm"
-seed poses bundler 0 <<'END'
+bundler=$(cat <<'END'
 # Bundle file v0.3
 2 1
 500 -0.1 0.01
@@ -160,6 +160,9 @@ seed poses bundler 0 <<'END'
 255 0 0
 1 0 7 12.5 -3.25
 END
+)
+seed poses bundler 0 <<<"$bundler"
+seed calibration bundler 6 <<<"$bundler"
 meshroom='{"version": ["1", "2", "6"], "views": [{"viewId": "1", "poseId": "2", "intrinsicId": "3", "path": "a.png"}],
  "intrinsics": [{"intrinsicId": "3", "width": "640", "height": "480", "sensorWidth": "36", "type": "radial3", "focalLength": "24",
  "pixelRatio": "1", "principalPoint": ["-2", "1"], "distortionParams": ["-0.1", "0.01", "0"]}], "poses": [{"poseId": "2",
@@ -179,9 +182,31 @@ metashape='<document version="2.0.0"><chunk><sensors><sensor id="0" type="frame"
 <transform><rotation>0 -1 0 1 0 0 0 0 1</rotation><translation>10 0 0</translation><scale>2</scale></transform></chunk></document>'
 seed poses metashape 0 <<<"$metashape"
 seed calibration metashape 5 <<<"$metashape"
+seed calibration realitycapture 7 <<<$'#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2\na.png,1,2,3,10,90,-5,35,0.01,-0.02,-0.1,0.01,0,0,0.001,0'
+pix4d=$'fileName imageWidth imageHeight\ncamera model m = K [R|-Rt] X\n\na.png 640 480\n415 0 318\n0 415 241\n0 0 1\n-0.1 0.01 0\n0.001 0\n1 2 3\n1 0 0\n0 1 0\n0 0 1'
+seed calibration pix4d 3 <<<"$pix4d"
+seed calibration pix4d-cam 10 <<<$'Pix4D camera calibration file 0\n#Focal Length mm assuming a sensor width of 6.4x4.8mm\nF 4.15\nPx 3.18\nPy 2.41\nK1 -0.1\nK2 0.01\nK3 0\nT1 0.001\nT2 0'
 seed poses realitycapture 0 <<<$'#name,x,y,alt,heading,pitch,roll,f\na.png,1,2,3,10,90,-5,35'
 seed poses pix4d 0 <<<$'imageName X Y Z Omega Phi Kappa\na.png 1 2 3 90 10 -5'
 seed gyro colon 0 <<<$'GYROFLOW IMU LOG\nversion:1.1\norientation,YxZ\ntscale,0.1\ngscale,0.01\nt,gx,gy,gz\n0,1,2,3\n1,2,3,4\n2,3,4,5\n9,4,5,6'
+# The MP4 of a GoPro: three payloads of four rates and two accelerations, a second each. All in hexadecimal digits.
+mp4_box() { printf '%08x%s%s' $((8 + ${#2} / 2)) "$(printf %s "$1" | od -An -v -tx1 | tr -d ' \n')" "$2"; }
+# klv KEY TYPE BYTES-OF-AN-ELEMENT ELEMENTS DIGITS
+klv() { printf '%s%s%02x%04x%s' "$(printf %s "$1" | od -An -v -tx1 | tr -d ' \n')" "$2" "$3" "$4" "$5"; }
+device=$(klv STRM 00 1 36 "$(klv SCAL 73 2 1 00640000)$(klv ACCL 73 6 2 03d500000000000003d60001)")
+device+=$(klv STRM 00 1 64 "$(klv ORIN 63 1 3 5a585900)$(klv SCAL 73 2 1 03e80000)$(klv GYRO 73 6 4 000100020003000200030004000300040005000400050006)")
+payload=$(klv DEVC 00 1 $((${#device} / 2)) "$device")
+bytes=$(printf %08x $((${#payload} / 2)))
+table=$(mp4_box stsd 00000000000000010000001067706d640000000000000001)
+table+=$(mp4_box stts 000000000000000100000003000003e8)
+table+=$(mp4_box stsc 0000000000000001000000010000000300000001)
+table+=$(mp4_box stsz "0000000000000000""00000003$bytes$bytes$bytes")
+table+=$(mp4_box stco 000000000000000100000014)
+media=$(mp4_box mdhd 000000000000000000000000000003e800000bb800000000)$(mp4_box minf "$(mp4_box stbl "$table")")
+gopro=$(mp4_box ftyp 6d703431)$(mp4_box mdat "$payload$payload$payload")$(mp4_box moov "$(mp4_box trak "$(mp4_box mdia "$media")")")
+for choice in 7 20 37; do
+    printf "$(sed 's/../\\x&/g' <<<"$gopro")" | seed gyro "gopro-$choice" "$(printf '%o' $choice)"
+done
 seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
 seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
 seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'

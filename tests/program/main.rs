@@ -18,6 +18,7 @@ mod faults;
 mod fittings;
 mod fuzzed;
 mod gis;
+mod gopro;
 mod gyro;
 mod init;
 mod lenses;

@@ -4,6 +4,7 @@ use crate::support::{self, edit, first_frames, succeed, text};
 use nalgebra::Matrix3;
 use std::path::Path;
 use tunnelstitch::camera::read_calibration;
+use tunnelstitch::survey::Survey;
 use tunnelstitch::trajectory::{CameraAxes, Pose, so3, tum};
 
 /// The poses of a file of the survey, as the program reads them.
@@ -251,4 +252,35 @@ fn init_finds_poses_and_cameras_in_one_file() {
         said.contains("put readout_ms = 12.5 under [camera]"),
         "{said}"
     );
+}
+
+/// A bundle file has poses and cameras, and the size of its pictures is that of the frames.
+#[test]
+fn init_takes_the_size_of_a_bundle_files_camera_from_the_frames() {
+    let survey = first_frames(4);
+    let dir = survey.path();
+    let truth = tum::read(&dir.join("groundtruth.tum")).unwrap();
+    let truth: Vec<Pose> = truth.iter().map(|stamped| stamped.pose).collect();
+    for file in [
+        "survey.toml",
+        "camera.json",
+        "baseline.tum",
+        "groundtruth.tum",
+    ] {
+        std::fs::remove_file(dir.join(file)).unwrap();
+    }
+    let names: Vec<String> = (0..4).map(|k| format!("./{}.jpg 0 400", name(k))).collect();
+    std::fs::write(dir.join("list.txt"), names.join("\n")).unwrap();
+    std::fs::write(dir.join("bundle.out"), bundle(&truth)).unwrap();
+    succeed(&["init", text(dir), "--radius-m", "3"]);
+    let toml = std::fs::read_to_string(dir.join("survey.toml")).unwrap();
+    for line in [
+        "file = \"bundle.out\"",
+        "initial = \"bundle.out\"    # 4 poses for 4 frames",
+    ] {
+        assert!(toml.contains(line), "{toml}");
+    }
+    let camera = Survey::open(dir).unwrap().camera;
+    assert_eq!((camera.width, camera.height), (480, 360));
+    assert_eq!((camera.fx, camera.cx, camera.cy), (400.0, 239.5, 179.5));
 }

@@ -1,11 +1,15 @@
 //! Frames, poses and calibrations from recordings of robots, through the program.
 
-use crate::support::recorder::{Wire, compressed, image, messages_of, write_bag, write_mcap};
+use crate::support::recorder::{
+    Wire, compressed, image, messages_of, transform, write_bag, write_mcap,
+};
 use crate::support::{edit, fail, simulate, succeed, text};
 use image::{DynamicImage, GrayImage};
+use nalgebra::{UnitQuaternion, Vector3};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use tunnelstitch::survey::Survey;
+use tunnelstitch::trajectory::Pose;
 
 /// A turn of a brick tunnel in small frames.
 fn simulated(folder: &Path) -> PathBuf {
@@ -85,6 +89,52 @@ fn a_recording_gives_what_its_pictures_give() {
         let recorded = recorded(&pictures, name, write);
         assert_eq!(checked(&recorded), expected, "{name}");
         assert!(refined(&recorded) == found, "{name}");
+    }
+}
+
+/// The robot drives in `odom`, which stands in `map`; the camera is mounted on it.
+#[test]
+fn the_camera_is_found_through_the_frames_of_a_robot() {
+    let dir = tempfile::tempdir().unwrap();
+    let pictures = simulated(dir.path());
+    let survey = Survey::open(&pictures).unwrap();
+    let quarter = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.2, 1.0));
+    let mount = Pose::new(quarter, Vector3::new(0.2, 0.0, 0.5));
+    let odom = Pose::new(quarter.inverse(), Vector3::new(-3.0, 1.0, 0.0));
+    for (name, wire) in [("tf.mcap", Wire::Ros2), ("tf.bag", Wire::Ros1)] {
+        let mut messages = messages_of(&survey, wire);
+        messages.retain(|message| message.topic != "/odom");
+        let fixed = [(["map", "odom"], &odom), (["base", "camera"], &mount)];
+        for (frames, pose) in fixed {
+            messages.push(transform(wire, "/tf_static", 0.0, frames, pose));
+        }
+        for stamped in &survey.initial {
+            let base = odom.inverse().after(&stamped.pose).after(&mount.inverse());
+            let frames = ["odom", "base"];
+            messages.push(transform(wire, "/tf", stamped.time_s, frames, &base));
+        }
+        let folder = recorded(&pictures, name, |path| match wire {
+            Wire::Ros1 => write_bag(path, &messages),
+            Wire::Ros2 => write_mcap(path, wire, &messages),
+        });
+        let toml = folder.join("survey.toml");
+        let initial = format!("initial = {name:?}");
+        edit(
+            &toml,
+            &initial,
+            &format!("{initial}\nparent = \"map\"\nchild = \"camera\""),
+        );
+        let read = Survey::open(&folder).unwrap();
+        for (found, expected) in read.initial.iter().zip(&survey.initial) {
+            assert!(found.pose.local(&expected.pose).norm() < 1e-9, "{name}");
+        }
+        edit(&toml, "child = \"camera\"", "child = \"wheel\"");
+        let said = fail(&["check", text(&folder)], 3);
+        assert!(
+            said.contains("there is no frame \"wheel\"; its transforms are"),
+            "{said}"
+        );
+        assert!(said.contains("base to camera (static)"), "{said}");
     }
 }
 

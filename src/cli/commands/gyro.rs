@@ -19,8 +19,9 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Writes initial poses (TUM): rotations integrated from a gyroscope log (gcsv, to which Gyroflow
-/// converts the logs of most cameras), positions from the planned motion of the carrier.
+/// Writes initial poses (TUM): rotations integrated from a gyroscope log (the MP4 of a GoPro, or
+/// gcsv, to which Gyroflow converts the logs of most cameras), positions from the planned motion of
+/// the carrier.
 ///
 /// Bias and noise density are estimated from an interval at rest, which is detected automatically.
 /// The prior for survey.toml follows from them.
@@ -35,10 +36,13 @@ use std::path::PathBuf;
     synchronises the clocks by the turns of the plan\n  \
     tunnelstitch gyro video.gcsv --frames 120 --fps 25 --rest-span-s 0,3 --down-deg 180 \
     --out baseline.tum\n      \
-    takes the first angle from gravity, with the tunnel's bottom at θ = 180°"
+    takes the first angle from gravity, with the tunnel's bottom at θ = 180°\n  \
+    tunnelstitch gyro GX010001.MP4 --survey survey --fps 29.97 --advance-m-per-s 0.2 \
+    --out survey/baseline.tum\n      \
+    reads the gyro that a GoPro writes into its video"
 )]
 pub struct GyroArguments {
-    /// The log: Gyroflow's gcsv.
+    /// The log: Gyroflow's gcsv, or a video as a GoPro wrote it (MP4 with its track `gpmd`).
     log: PathBuf,
     /// Folder of the survey whose frames get the poses, or its survey.toml. Its own poses need not
     /// exist yet.

@@ -6,6 +6,7 @@
 use image::DynamicImage;
 use std::path::Path;
 use tunnelstitch::survey::Survey;
+use tunnelstitch::trajectory::Pose;
 
 /// The serialisation of messages.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -62,13 +63,16 @@ impl Fields {
 
     /// A message that begins with a header.
     pub fn stamped(wire: Wire, time_s: f64) -> Self {
-        let fields = Self(wire, Vec::new());
-        let fields = match wire {
-            Wire::Ros1 => fields.u32(0),
-            Wire::Ros2 => fields,
+        Self(wire, Vec::new()).header(time_s, "camera")
+    }
+
+    fn header(self, time_s: f64, frame: &str) -> Self {
+        let fields = match self.0 {
+            Wire::Ros1 => self.u32(0),
+            Wire::Ros2 => self,
         };
         let nanoseconds = (time_s.fract() * 1e9).round() as u32;
-        fields.u32(time_s as u32).u32(nanoseconds).text("camera")
+        fields.u32(time_s as u32).u32(nanoseconds).text(frame)
     }
 
     pub fn into_bytes(self) -> Vec<u8> {
@@ -113,6 +117,26 @@ fn odometry(wire: Wire, time_s: f64, pose: &[f64; 7]) -> Message {
         time_s,
         // Covariance, twist, covariance.
         bytes: fields.f64s(&[0.0; 36 + 6 + 36]).into_bytes(),
+    }
+}
+
+/// A transform from the child's frame to the parent's as `tf2_msgs/TFMessage`.
+pub fn transform(
+    wire: Wire,
+    topic: &'static str,
+    time_s: f64,
+    [parent, child]: [&str; 2],
+    pose: &Pose,
+) -> Message {
+    let [x, y, z, w] = pose.r_wc.coords.into();
+    let t = pose.t_wc;
+    let fields = Fields(wire, Vec::new()).u32(1).header(time_s, parent);
+    let fields = fields.text(child).f64s(&[t.x, t.y, t.z, x, y, z, w]);
+    Message {
+        topic,
+        kind: "tf2_msgs/TFMessage",
+        time_s,
+        bytes: fields.into_bytes(),
     }
 }
 

@@ -9,7 +9,7 @@ use crate::frames::{FrameError, PictureOrientation, Video};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use tunnelstitch_geometry::camera::{Camera, read_calibration};
+use tunnelstitch_geometry::camera::{Camera, read_calibration_of};
 use tunnelstitch_geometry::recordings::is_recording;
 use tunnelstitch_geometry::trajectory::{
     DuplicateTimes, PoseFile, PoseFileOptions, read_poses_with,
@@ -56,7 +56,7 @@ pub struct Discovery {
     pub recorded: Option<(PathBuf, RecordedFrames)>,
     /// Groups of pictures, the largest first.
     pub pictures: Vec<PictureGroup>,
-    /// Calibrations, those with the frames' size first.
+    /// Calibrations, those with the frames' size first, and among these those that state it.
     pub calibrations: Vec<(PathBuf, Camera)>,
     /// Pose files; first those with as many poses as frames, and among these first those not named
     /// as ground truth.
@@ -83,24 +83,21 @@ impl Discovery {
         let mut walked = Walked::default();
         walk(folder, Path::new(""), MAX_DEPTH, &mut walked)?;
         walked.files.sort();
-        let mut groups: PictureFiles = BTreeMap::new();
-        let mut found = Self::default();
+        let group = |((parent, extension), files): (&(PathBuf, String), &Vec<&PathBuf>)| {
+            PictureGroup::of(folder, parent, extension, files)
+        };
+        let mut found = Self {
+            pictures: picture_files(&walked.files).iter().map(group).collect(),
+            ..Self::default()
+        };
         let mut aside = walked.unsearched;
         for file in &walked.files {
-            let extension = file
-                .extension()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            let lower = extension.to_lowercase();
+            let lower = extension(file).to_lowercase();
             if PICTURE_EXTENSIONS.contains(&lower.as_str()) {
-                if !is_mask(file) {
-                    let parent = file.parent().unwrap_or(Path::new("")).to_owned();
-                    groups.entry((parent, extension)).or_default().push(file);
-                } else if found.mask.is_none() {
-                    found.mask = Some(file.clone());
-                } else {
+                if is_mask(file) && found.mask.is_some() {
                     aside.push((file.clone(), "there is another mask".to_owned()));
+                } else if is_mask(file) {
+                    found.mask = Some(file.clone());
                 }
             } else if VIDEO_EXTENSIONS.contains(&lower.as_str()) {
                 found.videos.push(file.clone());
@@ -120,10 +117,6 @@ impl Discovery {
             }
         }
         found.left_aside = LeftAside::grouped(aside);
-        let group = |((parent, extension), files): (&(PathBuf, String), &Vec<&PathBuf>)| {
-            PictureGroup::of(folder, parent, extension, files)
-        };
-        found.pictures = groups.iter().map(group).collect();
         found.sort();
         Ok(found)
     }
@@ -162,8 +155,9 @@ impl Discovery {
         let (mut is_tried, mut is_taken) = (false, false);
         if is_calibration(file, extension) {
             is_tried = true;
+            let size = || self.picture_size();
             match read_up_to(MAX_CALIBRATION_BYTES, bytes, || {
-                read_calibration(&path, None)
+                read_calibration_of(&path, None, &size)
             }) {
                 Ok(camera) => {
                     is_taken = true;
@@ -267,14 +261,22 @@ impl Discovery {
         }
     }
 
+    /// Width and height of the pictures, pixels, for a calibration that does not state them.
+    fn picture_size(&self) -> Option<[u32; 2]> {
+        let groups = self.pictures.iter();
+        let largest = groups.min_by_key(|group| std::cmp::Reverse(group.count))?;
+        largest.size.map(|(width, height)| [width, height])
+    }
+
     fn sort(&mut self) {
         self.pictures
             .sort_by_key(|group| std::cmp::Reverse(group.count));
         let (count, size) = self.frames();
         let turned = self.picture_frames().and_then(|group| group.turned_size);
-        self.calibrations.sort_by_key(|(_, camera)| {
+        self.calibrations.sort_by_key(|(path, camera)| {
             let calibrated = Some((camera.width, camera.height));
-            (calibrated != size, calibrated != turned)
+            let other_size = (calibrated != size, calibrated != turned);
+            (other_size, has_no_size(path))
         });
         self.poses.sort_by_key(|(path, poses)| {
             let other_count = poses.entries.len() != count;
@@ -306,10 +308,34 @@ fn is_mask(file: &Path) -> bool {
 /// True if a file may be a calibration, by its name; `extension` is in lower case.
 fn is_calibration(file: &Path, extension: &str) -> bool {
     match extension {
-        "json" | "toml" | "yaml" | "yml" | "txt" | "sfm" | "xml" => true,
+        "json" | "toml" | "yaml" | "yml" | "txt" | "sfm" | "xml" | "out" | "csv" | "cam" => true,
         "bin" => file.ends_with("cameras.bin"),
         _ => false,
     }
+}
+
+/// True if a calibration has its size from the pictures, by its name.
+fn has_no_size(file: &Path) -> bool {
+    ["out", "csv", "cam"].contains(&extension(file).to_lowercase().as_str())
+}
+
+/// The extension of a file's name.
+fn extension(file: &Path) -> String {
+    let extension = file.extension().unwrap_or_default();
+    extension.to_string_lossy().into_owned()
+}
+
+/// The pictures among files, without masks, by folder and extension.
+fn picture_files(files: &[PathBuf]) -> PictureFiles<'_> {
+    let mut groups: PictureFiles = BTreeMap::new();
+    for file in files {
+        let extension = extension(file);
+        if PICTURE_EXTENSIONS.contains(&extension.to_lowercase().as_str()) && !is_mask(file) {
+            let parent = file.parent().unwrap_or(Path::new("")).to_owned();
+            groups.entry((parent, extension)).or_default().push(file);
+        }
+    }
+    groups
 }
 
 /// True if a file may hold poses, by its name; `extension` is in lower case.
@@ -427,12 +453,22 @@ mod tests {
             .save(dir.path().join("images/Mask.png"))
             .unwrap();
         write("notes.txt", "measured on a Monday\n");
+        let bundle = "# Bundle file v0.3\n1 0\n50 0 0\n1 0 0\n0 1 0\n0 0 1\n0 0 1\n";
+        write("a.out", bundle);
         let found = Discovery::of(dir.path()).unwrap();
         assert_eq!(found.pictures.len(), 1);
         assert_eq!(found.pictures[0].pattern, "images/*.png");
         assert_eq!(found.pictures[0].count, 3);
         assert_eq!(found.mask.as_deref(), Some(Path::new("images/Mask.png")));
-        assert_eq!(found.calibrations[0].0, Path::new("b.txt"));
+        let calibrations = found.calibrations.iter();
+        let calibrations: Vec<_> = calibrations
+            .map(|(path, c)| (path.as_path(), c.width))
+            .collect();
+        let expected = [("b.txt", 64), ("a.out", 64), ("a.txt", 128)];
+        assert_eq!(
+            calibrations,
+            expected.map(|(path, width)| (Path::new(path), width))
+        );
         assert_eq!(found.initial().unwrap().0, Path::new("right.tum"));
         assert!(found.truth().is_none());
     }

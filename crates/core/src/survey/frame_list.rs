@@ -139,6 +139,18 @@ impl FrameList {
         Ok(listing)
     }
 
+    /// Width and height of the first frame, pixels, for a calibration that does not state them;
+    /// [`None`] if there is none that can be read, which is an error of its own later.
+    pub fn first_size(
+        section: &FramesSection,
+        toml_path: &Path,
+        folder: &Path,
+    ) -> Option<[u32; 2]> {
+        let listed = Self::new(section, toml_path, folder, None).ok()?;
+        let (width, height) = listed.frames.iter().find_map(|frame| frame.size().ok())?;
+        Some([width, height])
+    }
+
     /// The frames with pictures read as turned for display, if only these have the `size` of the
     /// calibration; also the warning that they are, or that they are not although their EXIF data
     /// name an orientation. A section that says which is followed without a word.

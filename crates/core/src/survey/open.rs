@@ -18,7 +18,7 @@ use super::{ignore, pose_validation};
 use crate::frames::{FrameSet, Mask, Video};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tunnelstitch_geometry::camera::{Camera, read_calibration};
+use tunnelstitch_geometry::camera::{Camera, read_calibration_of};
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::surface::{
     Bend, RadialField, Surface, WallRegions, bent, displaced, with_range,
@@ -127,8 +127,10 @@ impl Survey {
         let displacement = found.and_then(|found| found.displacement());
         let surface = displaced(&nominal, displacement.clone());
         check_values(&file).map_err(value)?;
-        let calibrated =
-            read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
+        let picture_size = || FrameList::first_size(&file.frames, &toml_path, &folder);
+        let calibration = folder.join(&file.camera.file);
+        let camera_name = file.camera.name.as_deref();
+        let calibrated = read_calibration_of(&calibration, camera_name, &picture_size)?;
         let max_range_m = file.camera.max_range_m.unwrap_or(calibrated.max_range_m);
         let camera = with_range(
             &Camera {

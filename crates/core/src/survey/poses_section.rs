@@ -25,10 +25,11 @@ pub struct PosesSection {
     /// The topic of the poses in a recording; by default the only one with poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
-    /// The parent (`frame_id`) of a transform in a recording.
+    /// The fixed frame (`frame_id`) of transforms in a recording.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<String>,
-    /// The child (`child_frame_id`) of a transform in a recording.
+    /// The frame of the camera (`child_frame_id`) in transforms of a recording; between the two
+    /// there may be others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub child: Option<String>,
     /// Names of columns in the headers of CSV files, for columns whose names are not known.

@@ -53,8 +53,8 @@ impl Discovery {
                 text,
                 "# No calibration was found: OpenCV, ROS or Kalibr YAML, COLMAP's cameras.txt or \
                  cameras.bin, nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, \
-                 Meshroom or Metashape, a lens profile of Gyroflow, a recording with \
-                 CameraInfo, or our camera.json.\n\
+                 Meshroom, Metashape, Bundler, RealityCapture or Pix4D, a lens profile of \
+                 Gyroflow, a recording with CameraInfo, or our camera.json.\n\
                  file = \"camera.json\""
             ),
         };

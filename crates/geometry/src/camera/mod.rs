@@ -42,7 +42,9 @@ mod sweep;
 mod thin_prism;
 
 pub use brown_conrady::{BrownCoefficients, BrownConrady};
-pub use calibration::{CalibrationError, format_calibration, read_calibration, stated_readout_ms};
+pub use calibration::{
+    CalibrationError, format_calibration, read_calibration, read_calibration_of, stated_readout_ms,
+};
 pub use colmap::{ColmapCamera, UnknownModelError};
 pub use double_sphere::DoubleSphere;
 pub use eucm::Eucm;

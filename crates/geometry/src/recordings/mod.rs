@@ -10,6 +10,7 @@
 //! | numbers, texts and lists of records and messages | [`fields`] |
 //! | images | [`picture`] |
 //! | poses | [`recorded_pose`] |
+//! | transforms between frames of reference | [`transforms`] |
 //! | calibrations | [`camera_info`] |
 //!
 //! A recording is read once from its start to its end, chunk after chunk; afterwards each message
@@ -31,6 +32,7 @@ pub mod stamp;
 #[cfg(test)]
 mod tests;
 pub mod topic;
+pub mod transforms;
 
 pub use camera_info::CameraInfo;
 pub use error::RecordingError;
@@ -38,3 +40,4 @@ pub use picture::{CompressedPicture, RawPicture, RecordedPicture};
 pub use recorded_pose::{PoseTopic, RecordedPose};
 pub use recording::{MessageReader, Recording, is_recording};
 pub use topic::{Message, MessageKind, Topic, TopicGroup, Wire};
+pub use transforms::{TransformLink, TransformLinks};

@@ -8,7 +8,7 @@ use super::error::RecordingError;
 use super::fields::Fields;
 use super::recording::Recording;
 use super::stamp::Header;
-use super::topic::{MessageKind, TopicGroup, Wire};
+use super::topic::{MessageKind, Topic, TopicGroup, Wire};
 use std::collections::BTreeMap;
 
 /// Most transforms of one message: a robot has some hundred parts.
@@ -19,9 +19,9 @@ const MAX_TRANSFORMS: u32 = 10_000;
 pub struct PoseTopic {
     /// The topic; by default the only one with poses.
     pub topic: Option<String>,
-    /// The parent of a transform; by default that of the only transform of the topic.
+    /// The fixed frame of a transform; by default the parent of the only transform of the topic.
     pub parent: Option<String>,
-    /// The child of a transform.
+    /// The frame whose poses are read. Between the two there may be others.
     pub child: Option<String>,
 }
 
@@ -47,7 +47,7 @@ impl RecordedPose {
 }
 
 /// Poses by the names of parent and child; both are empty for messages that are not transforms.
-type ByFrames = BTreeMap<(String, String), Vec<RecordedPose>>;
+pub(super) type ByFrames = BTreeMap<(String, String), Vec<RecordedPose>>;
 
 impl Recording {
     /// Reads the poses of a topic, sorted by time.
@@ -57,6 +57,19 @@ impl Recording {
     /// message that ends too early.
     pub fn poses(&self, wanted: &PoseTopic) -> Result<Vec<RecordedPose>, RecordingError> {
         let topic = self.topic(TopicGroup::Poses, wanted.topic.as_deref())?;
+        let mut poses = choose(self.poses_of(topic)?, wanted).map_err(|what| {
+            let what = format!("topic {}: {what}", topic.name);
+            RecordingError::content(self.path(), what)
+        })?;
+        poses.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        Ok(poses)
+    }
+
+    /// Reads the poses of a topic, in the order of the file.
+    ///
+    /// # Errors
+    /// A message that ends too early; an unreadable file.
+    pub(super) fn poses_of(&self, topic: &Topic) -> Result<ByFrames, RecordingError> {
         let mut found = ByFrames::new();
         let mut reader = self.reader()?;
         for (k, message) in topic.messages.iter().enumerate() {
@@ -70,12 +83,7 @@ impl Recording {
                 RecordingError::content(self.path(), what)
             })?;
         }
-        let mut poses = choose(found, wanted).map_err(|what| {
-            let what = format!("topic {}: {what}", topic.name);
-            RecordingError::content(self.path(), what)
-        })?;
-        poses.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-        Ok(poses)
+        Ok(found)
     }
 }
 
@@ -127,7 +135,8 @@ fn choose(mut found: ByFrames, wanted: &PoseTopic) -> Result<Vec<RecordedPose>, 
     };
     let all: Vec<String> = found.iter().map(line).collect();
     Err(format!(
-        "name one of its transforms by `parent` and `child` under [poses]; it has {}",
+        "name the fixed frame and the camera's by `parent` and `child` under [poses]; its \
+         transforms are {}",
         all.join(", ")
     ))
 }

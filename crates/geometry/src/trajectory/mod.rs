@@ -74,6 +74,7 @@ mod stamped_pose;
 mod straight_path;
 pub mod text;
 pub mod times;
+mod transform_tree;
 pub mod tum;
 mod tunnel_frame;
 

@@ -3,10 +3,9 @@
 //!
 //! In a world with x east, y north and z up, the camera of angles 0 looks down, the upper side of
 //! its picture to the north. With OpenGL's axes of the camera its rotation to the world is
-//! `R = R_z(−heading) R_x(pitch) R_y(roll)`; heading is clockwise as seen from above. Focal lengths
-//! in such a file are those of a picture 36 mm wide; as there is no size of the pictures, no
-//! calibration is read. Source: Capturing Reality, "Registration export and camera orientations";
-//! nerfstudio 1.1, `realitycapture_utils.py`.
+//! `R = R_z(−heading) R_x(pitch) R_y(roll)`; heading is clockwise as seen from above. Source:
+//! Capturing Reality, "Registration export and camera orientations"; nerfstudio 1.1,
+//! `realitycapture_utils.py`.
 
 use super::csv::{separator, split};
 use super::error::PoseError;

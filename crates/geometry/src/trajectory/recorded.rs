@@ -7,14 +7,21 @@ use super::error::PoseError;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
 use super::text;
-use crate::recordings::{PoseTopic, RecordedPose, Recording, RecordingError};
+use super::transform_tree::{Motion, TransformTree};
+use crate::recordings::transforms::plain;
+use crate::recordings::{PoseTopic, RecordedPose, Recording, RecordingError, TransformLink};
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Reads the poses of a topic. A time that is there twice, as that of a repeated transform, is
-/// read once.
+/// Reads the poses of a topic, or of a frame of reference in another through those between them. A
+/// time that is there twice, as that of a repeated transform, is read once.
 pub(super) fn read(path: &Path, topic: &PoseTopic) -> Result<ParsedPoses, PoseError> {
-    let poses = Recording::open(path)?.poses(topic)?;
+    let recording = Recording::open(path)?;
+    if let Some(chained) = chained(&recording, topic)? {
+        return Ok(ParsedPoses::from(chained));
+    }
+    let poses = recording.poses(topic)?;
     let mut entries = EntryList::new(DuplicateTimes::Merge);
     for (k, pose) in poses.iter().enumerate() {
         entry(pose)
@@ -22,6 +29,50 @@ pub(super) fn read(path: &Path, topic: &PoseTopic) -> Result<ParsedPoses, PoseEr
             .map_err(|what| PoseError::file(path, format!("pose at {} s: {what}", pose.time_s)))?;
     }
     Ok(entries.into_parsed())
+}
+
+/// The poses of a frame in another; None if the two are not named, if the named topic has them as
+/// one transform, or if there are no transforms.
+fn chained(recording: &Recording, wanted: &PoseTopic) -> Result<Option<Vec<PoseEntry>>, PoseError> {
+    let (Some(fixed), Some(frame)) = (&wanted.parent, &wanted.child) else {
+        return Ok(None);
+    };
+    let links = recording.transform_links(wanted.topic.as_deref())?;
+    let (fixed, frame) = (plain(fixed), plain(frame));
+    let direct = links.get(&(frame.clone(), fixed.clone()));
+    let is_in_topic = wanted.topic.is_some() && direct.is_some_and(|link| !link.is_static);
+    if links.is_empty() || is_in_topic {
+        return Ok(None);
+    }
+    let fail = |what: String| PoseError::file(recording.path(), what);
+    let mut tree = BTreeMap::new();
+    for ((child, parent), link) in links {
+        let motion = motion(&link)
+            .map_err(|what| fail(format!("transform from {parent} to {child}: {what}")))?;
+        tree.insert((child, parent), motion);
+    }
+    let poses = TransformTree(tree).poses(&fixed, &frame).map_err(fail)?;
+    let entry = |(time_s, pose): (f64, Pose)| PoseEntry {
+        name: None,
+        time_s: Some(time_s),
+        pose,
+    };
+    Ok(Some(poses.into_iter().map(entry).collect()))
+}
+
+/// The motion of a link; of transforms of one time the first counts, of static ones the last.
+fn motion(link: &TransformLink) -> Result<Motion, String> {
+    let stamped = link.transforms.iter().map(|transform| {
+        let entry =
+            entry(transform).map_err(|what| format!("at {} s: {what}", transform.time_s))?;
+        Ok((transform.time_s, entry.pose))
+    });
+    let mut stamped = stamped.collect::<Result<Vec<(f64, Pose)>, String>>()?;
+    stamped.dedup_by_key(|(time_s, _)| *time_s);
+    match stamped.last() {
+        Some((_, last)) if link.is_static => Ok(Motion::Static(*last)),
+        _ => Ok(Motion::Moving(stamped)),
+    }
 }
 
 fn entry(pose: &RecordedPose) -> Result<PoseEntry, String> {
@@ -56,6 +107,7 @@ mod tests {
     use crate::trajectory::format::PoseFormat;
     use crate::trajectory::pose_file::read_poses_with;
     use crate::trajectory::pose_options::PoseFileOptions;
+    use nalgebra::{Quaternion, UnitQuaternion};
     use std::path::PathBuf;
 
     const FILES: [&str; 3] = ["zstd.mcap", "ros1.mcap", "bz2.bag"];
@@ -102,6 +154,66 @@ mod tests {
                 assert_eq!(entry.pose.r_wc.coords.as_slice(), [0.6, 0.0, 0.0, 0.8]);
             }
         }
+    }
+
+    /// The camera is mounted on the base as the base was at first.
+    #[test]
+    fn transforms_are_followed_through_the_frames_between() {
+        for (name, topic, parent) in FILES
+            .into_iter()
+            .flat_map(|name| [(name, Some("/tf"), "map"), (name, None, "/map")])
+        {
+            let options = |child: &str| PoseFileOptions {
+                recorded: PoseTopic {
+                    topic: topic.map(str::to_owned),
+                    parent: Some(parent.to_owned()),
+                    child: Some(child.to_owned()),
+                },
+                ..PoseFileOptions::default()
+            };
+            let read = read_poses_with(&fixture(name), &options("camera")).unwrap();
+            assert_eq!(read.entries.len(), 7, "{name}");
+            let turn = UnitQuaternion::from_quaternion(Quaternion::new(0.8, 0.6, 0.0, 0.0));
+            for (k, entry) in read.entries.iter().enumerate() {
+                let base = Pose::new(turn, Vector3::new(0.25 * k as f64, -1.0, 0.5));
+                let expected = base.after(&Pose::new(turn, Vector3::new(0.0, -1.0, 0.5)));
+                assert!(
+                    entry.pose.local(&expected).norm() < 1e-12,
+                    "{name}: {entry:?}"
+                );
+            }
+            let said = read_poses_with(&fixture(name), &options("wheel")).unwrap_err();
+            let said = said.to_string();
+            assert!(said.contains("there is no frame \"wheel\""), "{said}");
+            assert!(
+                said.contains("map to base (7), base to camera (7)"),
+                "{said}"
+            );
+        }
+    }
+
+    /// `map` to `odom` and `base` to `camera` do not change, and `odom` to `base` does.
+    #[test]
+    fn static_transforms_hold_at_all_times() {
+        let options = |parent: &str| PoseFileOptions {
+            recorded: PoseTopic {
+                topic: None,
+                parent: Some(parent.to_owned()),
+                child: Some("camera".to_owned()),
+            },
+            ..PoseFileOptions::default()
+        };
+        let path = fixture("transforms.mcap");
+        let turn = UnitQuaternion::from_quaternion(Quaternion::new(0.8, 0.6, 0.0, 0.0));
+        let at = |k: usize| Pose::new(turn, Vector3::new(0.25 * k as f64, -1.0, 0.5));
+        let read = read_poses_with(&path, &options("map")).unwrap();
+        assert_eq!(read.entries.len(), 7);
+        for (k, entry) in read.entries.iter().enumerate() {
+            let expected = at(2).after(&at(k)).after(&at(0));
+            assert!(entry.pose.local(&expected).norm() < 1e-12, "{entry:?}");
+        }
+        let said = read_poses_with(&path, &options("base")).unwrap_err();
+        assert!(said.to_string().contains("are static"), "{said}");
     }
 
     #[test]

@@ -27,6 +27,9 @@ const MIN_DAMPING: f64 = 1e-4;
 /// 100, where a step is a hundredth of that along the gradient.
 const MAX_DAMPING_ITERATIONS: usize = 8;
 
+/// Curvature along a step that lengthens the next one at the most: twofold.
+const MIN_CURVATURE: f64 = 0.5;
+
 /// The end of a solve.
 pub struct Solution<'a> {
     /// The problem that was solved.
@@ -210,10 +213,13 @@ impl DampedGaussNewton {
         let frames = &unknowns.frames;
         let mut undamped_failed = false;
         for _ in 0..MAX_DAMPING_ITERATIONS {
-            let Some((mut step, shared)) = self.damped_step(problem, &current)? else {
+            let Some((mut step, mut shared)) = self.damped_step(problem, &current)? else {
                 self.raise_damping();
                 continue;
             };
+            let length = self.step_length(problem);
+            step.iter_mut().for_each(|step| *step *= length);
+            shared *= length;
             let all_feasible = hold_infeasible_frames(problem, frames, &mut step);
             let moved = problem.wall_step_px(frames, &step, &shared);
             let step_px = moved.into_iter().fold(0.0, f64::max);
@@ -246,10 +252,10 @@ impl DampedGaussNewton {
                 && next.cost < (1.0 + MAX_COST_RISE) * current.cost;
             if next.cost < current.cost || settles {
                 record.cost = Some(next.cost);
-                // A whole undamped step is δ = −H⁻¹ g.
+                // An undamped step is δ = −α H⁻¹ g, with its length α.
                 let of_poses = |at| slots_slope(&step[..frames.len()], at, 6);
                 record.curvature = (self.lambda == 0.0 && all_feasible)
-                    .then(|| 1.0 - of_poses(&next) / of_poses(&current));
+                    .then(|| (1.0 - of_poses(&next) / of_poses(&current)) / length);
                 self.steps.push(record);
                 self.lower_damping();
                 return Ok((candidate, next));
@@ -281,6 +287,22 @@ impl DampedGaussNewton {
         match current.step(&factor, self.lambda, problem.tested()) {
             None if is_last_resort => Err(problem.factor_error(FactorError::NotPositiveDefinite)),
             step => Ok(step),
+        }
+    }
+
+    /// The length of the next step in Gauss–Newton steps: the inverse of the curvature along the
+    /// step before, if that was within a pixel and the gradient changes less along it than the
+    /// normal equations predict. The steps at the end of a solve all follow its weakest
+    /// directions, so that curvatures hardly change from one to the next.
+    ///
+    /// Source: J. Barzilai and J. M. Borwein, "Two-point step size gradient methods", IMA Journal
+    /// of Numerical Analysis 8(1), 1988.
+    fn step_length(&self, problem: &PhotometricProblem) -> f64 {
+        let within_a_pixel = |step: &&StepRecord| step.step_px < problem.pixel_px();
+        let before = self.steps.last().filter(within_a_pixel);
+        match before.and_then(|step| step.curvature) {
+            Some(curvature) if self.lambda == 0.0 => curvature.clamp(MIN_CURVATURE, 1.0).recip(),
+            _ => 1.0,
         }
     }
 

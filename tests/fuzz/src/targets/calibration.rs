@@ -1,9 +1,13 @@
 //! Calibration files of every kind; the first byte selects the extension.
 
 use super::super::file;
-use tunnelstitch::camera::{ColmapCamera, format_calibration, read_calibration};
+use tunnelstitch::camera::{
+    ColmapCamera, format_calibration, read_calibration, read_calibration_of,
+};
 
-const ENDINGS: [&str; 6] = ["json", "toml", "yaml", "txt", "bin", "xml"];
+const ENDINGS: [&str; 9] = [
+    "json", "toml", "yaml", "txt", "bin", "xml", "out", "csv", "cam",
+];
 
 /// Reads the input.
 pub fn run(data: &[u8]) {
@@ -13,7 +17,7 @@ pub fn run(data: &[u8]) {
     let ending = ENDINGS[usize::from(*first) % ENDINGS.len()];
     let (_folder, path) = file(&format!("camera.{ending}"), content);
     let _ = read_calibration(&path, Some("cam0"));
-    if let Ok(camera) = read_calibration(&path, None) {
+    if let Ok(camera) = read_calibration_of(&path, None, &|| Some([640, 480])) {
         // A camera that was read can be used and written.
         let _ = camera.border(4, 0.5);
         let _ = ColmapCamera::of(&camera).map(|colmap| colmap.cameras_txt());

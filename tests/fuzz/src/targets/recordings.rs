@@ -15,6 +15,8 @@ const IMAGES: [Option<&str>; 3] = [
     Some("/rear/image/compressed"),
 ];
 const POSES: [&str; 3] = ["/odom", "/pose_cov", "/tf"];
+/// Names of no frames, and of two with another between them.
+const FRAMES: [Option<[&str; 2]>; 2] = [None, Some(["map", "camera"])];
 /// Larger pictures only cost time.
 const MAX_PX: u32 = 1 << 16;
 
@@ -31,9 +33,12 @@ pub fn run(data: &[u8]) {
         let _ = (found.frames(), found.survey_toml(None));
     }
     let _ = (read_calibration(&path, None), read_poses(&path, None));
-    for topic in POSES {
+    let frames = FRAMES.map(|frames| frames.map(|[parent, child]| (parent, child)).unzip());
+    for (topic, (parent, child)) in POSES.into_iter().flat_map(|t| frames.map(|f| (t, f))) {
         let mut options = PoseFileOptions::default();
         options.recorded.topic = Some(topic.to_owned());
+        options.recorded.parent = parent.map(str::to_owned);
+        options.recorded.child = child.map(str::to_owned);
         if let Ok(read) = read_poses_with(&path, &options) {
             assert!(read.entries.iter().all(|entry| entry.pose.is_finite()));
         }

@@ -1,7 +1,7 @@
 //! Calibration files: the program's own format (JSON or TOML), OpenCV's YAML, ROS's camera_info,
 //! Kalibr's camchain, the YAML of camodocal and VINS-Fusion, COLMAP's cameras.txt and cameras.bin,
-//! nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, Meshroom
-//! and Metashape, Basalt's JSON, Gyroflow's lens profiles and OCamCalib's
+//! nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, Meshroom, Metashape, Bundler,
+//! RealityCapture and Pix4D, Basalt's JSON, Gyroflow's lens profiles and OCamCalib's
 //! calib_results.txt.
 //!
 //! | file | recognised by | lens | centre of the first pixel |
@@ -17,12 +17,16 @@
 //! | OpenMVG | `.json` with `sfm_data_version` | `pinhole`, `pinhole_radial_k1`, `pinhole_radial_k3`, `pinhole_brown_t2`, `fisheye` | (0, 0) |
 //! | Meshroom | `.json`, `.sfm` with `version` and `intrinsics` | pinhole with `radialk1`, `radialk3`, `brown`, `fisheye`, `none` | (0, 0) |
 //! | Metashape | `.xml` with a `chunk` | `frame`, `fisheye` | (½, ½) |
+//! | Bundler | `.out` that begins with `# Bundle file` | f, k1, k2; size from the pictures | (0, 0) |
+//! | RealityCapture | `.csv` with a comment `#name,…,f,…` | Brown 3, with or without tangential; size from the pictures | (½, ½) |
+//! | Pix4D | `.txt` that begins with `fileName imageWidth imageHeight`; `.cam`, size from the pictures | perspective | (½, ½) |
 //! | Basalt | `.json` with `value0` | `pinhole`, `ds`, `eucm`, `ucm`, `kb4`, `fov` | (0, 0) |
 //! | Gyroflow | `.json` with `fisheye_params` and `calib_dimension` | `opencv_fisheye`, `opencv_standard` | (0, 0) |
 //! | recording | `.mcap`, `.bag` | `plumb_bob`, `rational_polynomial`, `equidistant` of its CameraInfo | (0, 0) |
 //! | nerfstudio, instant-ngp | `.json` with `fl_x`, `camera_angle_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
 
 mod basalt;
+mod bundler;
 mod camodocal;
 mod coefficients;
 mod colmap;
@@ -41,7 +45,11 @@ mod ocamcalib;
 mod opencv;
 mod openmvg;
 mod opensfm;
+mod per_picture;
+mod picture_size;
+mod pix4d;
 mod read;
+mod realitycapture;
 mod recorded;
 mod selection;
 #[cfg(test)]
@@ -50,7 +58,8 @@ mod unknown;
 mod value_tree;
 #[cfg(test)]
 mod wide_angle_tests;
+mod words;
 
 pub use error::CalibrationError;
 pub use native::format_calibration;
-pub use read::{read_calibration, stated_readout_ms};
+pub use read::{read_calibration, read_calibration_of, stated_readout_ms};

@@ -1,10 +1,12 @@
 //! Reading and validation of calibration files.
 
 use super::error::{CalibrationError, ParseError};
+use super::picture_size::PictureSize;
 use super::unknown::unknown_calibration;
 use super::{
-    basalt, camodocal, colmap, colmap_binary, gyroflow, kalibr, meshroom, metashape, native,
-    nerfstudio, ocamcalib, opencv, openmvg, opensfm, recorded, value_tree,
+    basalt, bundler, camodocal, colmap, colmap_binary, gyroflow, kalibr, meshroom, metashape,
+    native, nerfstudio, ocamcalib, opencv, openmvg, opensfm, pix4d, realitycapture, recorded,
+    value_tree,
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
@@ -22,12 +24,27 @@ const MIN_VISIBLE_FRACTION: f64 = 0.5;
 
 /// Reads a calibration file of any supported format (see the table in the module's documentation).
 /// `name` selects the camera if the file holds several (`cam1`, a COLMAP id, the topic of a
-/// recording).
+/// recording, a picture).
 ///
 /// # Errors
 /// An unreadable file; an unknown, missing or impossible entry, with its line where it is known; a
-/// lens model that is not supported; several cameras and no name.
+/// lens model that is not supported; several cameras and no name; a file that does not state the
+/// size of the pictures ([`read_calibration_of`]).
 pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, CalibrationError> {
+    read_calibration_of(path, name, &|| None)
+}
+
+/// Reads a calibration file as [`read_calibration`] does; `picture_size` gives width and height of
+/// the pictures, pixels, and is asked only for files that do not state them (Bundler,
+/// RealityCapture, Pix4D's `.cam`).
+///
+/// # Errors
+/// Those of [`read_calibration`]; a size that is needed and not known.
+pub fn read_calibration_of(
+    path: &Path,
+    name: Option<&str>,
+    picture_size: PictureSize,
+) -> Result<Camera, CalibrationError> {
     let content = |error: ParseError| CalibrationError::Content {
         path: path.to_owned(),
         line: error.line,
@@ -54,7 +71,8 @@ pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, Calib
             "this is not a text file; give the calibration file itself",
         ))
     })?;
-    parse(text.trim_start_matches('\u{feff}'), &extension, name)
+    let text = text.trim_start_matches('\u{feff}');
+    parse(text, &extension, name, picture_size)
         .and_then(validate)
         .map_err(content)
 }
@@ -71,7 +89,12 @@ pub fn stated_readout_ms(path: &Path) -> Option<f64> {
         .flatten()
 }
 
-fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, ParseError> {
+fn parse(
+    text: &str,
+    extension: &str,
+    name: Option<&str>,
+    size: PictureSize,
+) -> Result<Camera, ParseError> {
     match extension {
         "yaml" | "yml" => {
             let tree = value_tree::parse_yaml(text)?;
@@ -83,14 +106,14 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
                 opencv::read(&tree)
             }
         }
+        "txt" if pix4d::is_picture_list(text) => pix4d::read_pictures(text, name),
         "txt" if ocamcalib::is_ocamcalib(text) => ocamcalib::read(text),
         "txt" if colmap::has_no_model(text) => Err(unknown_calibration("")),
         "txt" => colmap::read(text, name),
-        "out" => Err(ParseError::new(
-            "a bundle file has no size of its pictures; write a camera.json with it: the model \
-             brown-conrady, fx and fy the first number of a camera, k1 and k2 the other two, cx = \
-             (width − 1) / 2, cy = (height − 1) / 2",
-        )),
+        "out" if bundler::is_bundle(text) => bundler::read(text, name, size),
+        "csv" if realitycapture::is_table(text) => realitycapture::read(text, name, size),
+        "cam" if pix4d::is_cam(text) => pix4d::read_cam(text, name, size),
+        "out" | "csv" | "cam" => Err(unknown_calibration("")),
         "toml" => native::read_toml(text),
         "xml" if !text.contains("<opencv_storage") => metashape::read(text, name),
         "xml" => Err(ParseError::new(

@@ -20,6 +20,19 @@ pub(super) fn read_camera(
     read_calibration(&path, camera)
 }
 
+/// Reads a calibration file of pictures of this width and height.
+pub(super) fn read_sized(
+    name: &str,
+    text: &str,
+    camera: Option<&str>,
+    size: Option<[u32; 2]>,
+) -> Result<Camera, CalibrationError> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join(name);
+    std::fs::write(&path, text).unwrap();
+    read_calibration_of(&path, camera, &|| size)
+}
+
 fn with(lens: Lens) -> Camera {
     Camera {
         lens,

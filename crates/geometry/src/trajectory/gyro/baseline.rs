@@ -2,9 +2,9 @@
 
 use super::clock_offset::ClockMatch;
 use super::clock_offset::Turned;
-use super::gcsv::GyroLog;
 use super::gravity::{angle_from_gravity_rad, axis_in_camera};
 use super::integration::IntegratedRotation;
+use super::log::GyroLog;
 use super::noise::RotationNoise;
 use super::rate_unit::wrong_unit;
 use super::rates::AngularRates;
@@ -158,10 +158,12 @@ pub fn baseline_from_gyro(
         Some(turned.at(last_s)? - turned.at(first_s)?)
     };
     let measured_rad = turned_rad(&bias);
-    let wrong_unit = measured_rad.and_then(|measured_rad| {
-        let planned_rad = options.total_turn_rad.unwrap_or(planned_turn_rad(frames));
-        wrong_unit(measured_rad, planned_rad, log.rate_scale)
-    });
+    let wrong_unit = measured_rad
+        .zip(log.rate_scale)
+        .and_then(|(measured_rad, scale)| {
+            let planned_rad = options.total_turn_rad.unwrap_or(planned_turn_rad(frames));
+            wrong_unit(measured_rad, planned_rad, scale)
+        });
     if let (Some(total_rad), Some(measured_rad)) = (options.total_turn_rad, measured_rad)
         && last_s > first_s
     {
@@ -303,7 +305,7 @@ fn gaps(rates: &AngularRates, span_s: [f64; 2]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::gyro::gcsv::GyroSample;
+    use crate::trajectory::gyro::log::GyroSample;
     use crate::trajectory::so3;
 
     /// A sensor without noise, with a bias of 0.01 rad/s about every axis: three seconds at rest,
@@ -321,7 +323,7 @@ mod tests {
             path: "log.gcsv".into(),
             orientation: None,
             readout: None,
-            rate_scale: 1.0,
+            rate_scale: Some(1.0),
             samples: times.filter(|t| !in_gap(*t)).map(sample).collect(),
         }
     }

@@ -6,64 +6,18 @@
 //!
 //! Source: <https://docs.gyroflow.xyz/app/technical-details/gcsv-format>.
 
+use super::log::{GyroLog, GyroSample, Readout, ReadoutDirection};
 use super::orientation::Orientation;
-use super::rates::AngularRates;
 use crate::trajectory::error::PoseError;
 use crate::trajectory::text;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The two possible first lines.
 const TITLES: [&str; 2] = ["GYROFLOW IMU LOG", "CAMERA IMU LOG"];
 /// The table's columns, of which the first 4, 7 or all are present.
 const COLUMNS: [&str; 10] = ["t", "gx", "gy", "gz", "ax", "ay", "az", "mx", "my", "mz"];
-
-/// One line of a log, in the sensor's axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GyroSample {
-    /// Seconds of the log's clock.
-    pub time_s: f64,
-    /// Angular rates by the right-hand rule, rad/s.
-    pub rate_rad_s: Vector3<f64>,
-    /// Specific force, multiples of g; at rest it points up.
-    pub acceleration_g: Option<Vector3<f64>>,
-}
-
-/// The readout direction of a rolling shutter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReadoutDirection {
-    /// From the first row to the last.
-    TopToBottom,
-    /// From the last row to the first.
-    BottomToTop,
-    /// Column by column, which this program does not support.
-    Sideways,
-}
-
-/// The readout of a rolling shutter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Readout {
-    /// Time from the first row to the last, milliseconds.
-    pub time_ms: f64,
-    /// The readout direction.
-    pub direction: ReadoutDirection,
-}
-
-/// A gyroscope's log with at least two samples of increasing times.
-#[derive(Clone, Debug)]
-pub struct GyroLog {
-    /// The file.
-    pub path: PathBuf,
-    /// Orientation of the sensor in the camera, if given.
-    pub orientation: Option<Orientation>,
-    /// Readout of the camera's rolling shutter, if given.
-    pub readout: Option<Readout>,
-    /// Factor from the file's values to rad/s, its `gscale`.
-    pub rate_scale: f64,
-    /// The samples.
-    pub samples: Vec<GyroSample>,
-}
 
 /// The `key,value` lines.
 #[derive(Default)]
@@ -117,100 +71,87 @@ impl Header<'_> {
     }
 }
 
-impl GyroLog {
-    /// Reads a log.
-    ///
-    /// # Errors
-    /// An unreadable file; another first line; a header without scales, or with an impossible
-    /// orientation; a table with other columns; a line with more or fewer columns than the table's
-    /// first, or with something that is no number; times that do not increase; fewer than two
-    /// samples.
-    pub fn read(path: &Path) -> Result<Self, PoseError> {
-        let text = text::read(path)?;
-        let mut lines = text::lines(&text);
-        match lines.next() {
-            Some((_, title)) if TITLES.contains(&title) => {}
-            first => {
-                let (number, found) = first.unwrap_or((1, ""));
-                let found: String = found.chars().take(40).collect();
-                return Err(PoseError::line(
-                    path,
-                    number,
-                    format!(
-                        "`{found}` where a gcsv log begins with `{}`; Gyroflow converts others to \
-                         it",
-                        TITLES[0]
-                    ),
-                ));
-            }
-        }
-        let mut header = Header::default();
-        let columns = loop {
-            let Some((number, line)) = lines.next() else {
-                return Err(PoseError::file(
-                    path,
-                    "ends within its header: there is no line `t,gx,gy,gz`",
-                ));
-            };
-            let Some((key, value)) = line.split_once([',', ':']) else {
-                let what = format!("`{line}` where the header has lines `key,value`");
-                return Err(PoseError::line(path, number, what));
-            };
-            let key = key.trim().to_lowercase();
-            if key == "t" || key == "time" {
-                break columns(line).map_err(|what| PoseError::line(path, number, what))?;
-            }
-            header.0.insert(key, (number, value.trim()));
-        };
-        let orientation = match header.0.get("orientation") {
-            Some((number, word)) => {
-                let fail = |what: String| PoseError::line(path, *number, what);
-                Some(Orientation::parse(word).map_err(fail)?)
-            }
-            None => None,
-        };
-        let scales = Scales {
-            seconds: header.scale(path, "tscale", "times")?,
-            rad_s: header.scale(path, "gscale", "rates")?,
-            g: if columns > 4 {
-                header.scale(path, "ascale", "accelerations")?
-            } else {
-                1.0
-            },
-        };
-        let readout = header.readout(path)?;
-        let mut samples: Vec<GyroSample> = Vec::new();
-        for (number, line) in lines {
-            let last_s = samples.last().map(|sample| sample.time_s);
-            let sample = sample(line, columns, &scales, last_s)
-                .map_err(|what| PoseError::line(path, number, what))?;
-            samples.push(sample);
-        }
-        if samples.len() < 2 {
-            return Err(PoseError::file(
+/// Reads a gcsv log.
+///
+/// # Errors
+/// An unreadable file; another first line; a header without scales, or with an impossible
+/// orientation; a table with other columns; a line with more or fewer columns than the table's
+/// first, or with something that is no number; times that do not increase; fewer than two
+/// samples.
+pub fn read(path: &Path) -> Result<GyroLog, PoseError> {
+    let text = text::read(path)?;
+    let mut lines = text::lines(&text);
+    match lines.next() {
+        Some((_, title)) if TITLES.contains(&title) => {}
+        first => {
+            let (number, found) = first.unwrap_or((1, ""));
+            let found: String = found.chars().take(40).collect();
+            return Err(PoseError::line(
                 path,
-                format!("{} samples; at least two are needed", samples.len()),
+                number,
+                format!(
+                    "`{found}` where a gcsv log begins with `{}`; Gyroflow converts others to \
+                     it",
+                    TITLES[0]
+                ),
             ));
         }
-        Ok(Self {
-            path: path.to_owned(),
-            orientation,
-            readout,
-            rate_scale: scales.rad_s,
-            samples,
-        })
     }
-
-    /// The rates in camera coordinates; `to_camera` maps the sensor's axes to the camera's.
-    pub fn rates(&self, to_camera: &Matrix3<f64>) -> AngularRates {
-        let samples = self.samples.iter();
-        AngularRates::new(
-            samples.clone().map(|sample| sample.time_s).collect(),
-            samples
-                .map(|sample| to_camera * sample.rate_rad_s)
-                .collect(),
-        )
+    let mut header = Header::default();
+    let columns = loop {
+        let Some((number, line)) = lines.next() else {
+            return Err(PoseError::file(
+                path,
+                "ends within its header: there is no line `t,gx,gy,gz`",
+            ));
+        };
+        let Some((key, value)) = line.split_once([',', ':']) else {
+            let what = format!("`{line}` where the header has lines `key,value`");
+            return Err(PoseError::line(path, number, what));
+        };
+        let key = key.trim().to_lowercase();
+        if key == "t" || key == "time" {
+            break columns(line).map_err(|what| PoseError::line(path, number, what))?;
+        }
+        header.0.insert(key, (number, value.trim()));
+    };
+    let orientation = match header.0.get("orientation") {
+        Some((number, word)) => {
+            let fail = |what: String| PoseError::line(path, *number, what);
+            Some(Orientation::parse(word).map_err(fail)?)
+        }
+        None => None,
+    };
+    let scales = Scales {
+        seconds: header.scale(path, "tscale", "times")?,
+        rad_s: header.scale(path, "gscale", "rates")?,
+        g: if columns > 4 {
+            header.scale(path, "ascale", "accelerations")?
+        } else {
+            1.0
+        },
+    };
+    let readout = header.readout(path)?;
+    let mut samples: Vec<GyroSample> = Vec::new();
+    for (number, line) in lines {
+        let last_s = samples.last().map(|sample| sample.time_s);
+        let sample = sample(line, columns, &scales, last_s)
+            .map_err(|what| PoseError::line(path, number, what))?;
+        samples.push(sample);
     }
+    if samples.len() < 2 {
+        return Err(PoseError::file(
+            path,
+            format!("{} samples; at least two are needed", samples.len()),
+        ));
+    }
+    Ok(GyroLog {
+        path: path.to_owned(),
+        orientation,
+        readout,
+        rate_scale: Some(scales.rad_s),
+        samples,
+    })
 }
 
 /// Scale factors of the raw numbers.
@@ -284,7 +225,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("log.gcsv");
         std::fs::write(&path, text).unwrap();
-        GyroLog::read(&path)
+        super::read(&path)
     }
 
     /// The example of the format's documentation.

@@ -52,6 +52,11 @@ impl Orientation {
         }
     }
 
+    /// The orientation of a matrix from the sensor's axes to Gyroflow's.
+    pub(super) fn from_matrix(to_own: Matrix3<f64>) -> Self {
+        Self { to_own }
+    }
+
     /// The matrix from the sensor's axes to the camera's (x right, y down, z forward):
     /// `(−y, −x, −z)` of Gyroflow's.
     pub fn to_camera(&self) -> Matrix3<f64> {
