@@ -42,6 +42,11 @@ impl Lamp {
         }
     }
 
+    /// True if it is at the camera, as it is assumed to be before it is found.
+    pub fn is_at_camera(&self) -> bool {
+        self.position == Vector3::zeros()
+    }
+
     /// Its unknowns: the position in units of the reach.
     pub fn unknowns(&self) -> [f64; TERMS] {
         self.position.into()

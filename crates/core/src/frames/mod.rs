@@ -47,7 +47,7 @@ pub use picture_decoder::open_picture;
 pub use picture_reading::{PictureOrientation, PictureReading};
 pub use pyramid::Pyramid;
 pub use recorded_images::RecordedImages;
-pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
+pub use shading::{MeanShading, Shading, TERMS as SHADING_TERMS, terms as shading_terms};
 pub use static_pixels::{
     MotionCell, MotionField, StaticPixels, TemporalStatistics, find_static_pixels,
 };

@@ -142,17 +142,29 @@ impl Shading {
             }
         }
     }
+}
 
-    /// The shading that explains the mean of many frames, `log mean(u, v) = c + Σ c_k B_k`, if it
-    /// is one.
-    ///
-    /// Over a survey every pixel sees all kinds of wall, so that what is left in the mean is the
-    /// camera's own. `mean` is a picture of any smaller size that shows the whole frame (cell
-    /// centres at `(i + ½)/n` of its width), NaN where nothing is known.
-    ///
-    /// The wall's texture does not average out completely; the fit stands only if it explains most
-    /// of what varies over the mean. Otherwise [`None`].
-    pub fn of_mean(mean: &GreyImage, size: (usize, usize)) -> Option<Self> {
+/// The shading that fits the mean of many frames best, `log mean(u, v) = c + Σ c_k B_k`.
+///
+/// Over a survey every pixel sees all kinds of wall, so that what is left in the mean is the
+/// camera's own; the wall's texture does not average out completely.
+#[derive(Clone, Debug)]
+pub struct MeanShading {
+    /// The shading.
+    pub shading: Shading,
+    /// Number of pixels of the mean with a value.
+    pub pixels: usize,
+    /// Variance of `log mean` over them.
+    pub variance: f64,
+    /// The part of it that the shading does not explain.
+    pub left: f64,
+}
+
+impl MeanShading {
+    /// Fits a shading of pictures of `size` to their `mean`: a picture of any smaller size that
+    /// shows the whole frame (cell centres at `(i + ½)/n` of its width), NaN where nothing is
+    /// known. [`None`] if too little is.
+    pub fn fit(mean: &GreyImage, size: (usize, usize)) -> Option<Self> {
         let (w, h) = (mean.width(), mean.height());
         let mut rows = Vec::new();
         for j in 0..h {
@@ -178,13 +190,21 @@ impl Shading {
         let solution = (design.transpose() * &design)
             .cholesky()?
             .solve(&(design.transpose() * &target));
-        let left = (&target - &design * &solution).norm_squared();
-        let spread = (target.norm_squared() / count).sqrt();
-        let explained = 1.0 - left / target.norm_squared().max(f64::MIN_POSITIVE);
-        (spread > MIN_LOG_SPREAD && explained > MIN_EXPLAINED_SHARE).then(|| Self {
-            size,
-            coefficients: std::array::from_fn(|k| solution[k + 1]),
+        Some(Self {
+            shading: Shading {
+                size,
+                coefficients: std::array::from_fn(|k| solution[k + 1]),
+            },
+            pixels: rows.len(),
+            variance: target.norm_squared() / count,
+            left: (&target - &design * &solution).norm_squared() / count,
         })
+    }
+
+    /// True if the mean varies and the shading explains most of that: it is no mere texture.
+    pub fn is_light(&self) -> bool {
+        let explained = 1.0 - self.left / self.variance.max(f64::MIN_POSITIVE);
+        self.variance.sqrt() > MIN_LOG_SPREAD && explained > MIN_EXPLAINED_SHARE
     }
 }
 
@@ -210,7 +230,9 @@ mod tests {
             (120.0 * lamp(x, y)) as f32
         };
         let mut image = GreyImage::new(64, 48, (0..64 * 48).map(picture).collect());
-        let shading = Shading::of_mean(&image, size).unwrap();
+        let found = MeanShading::fit(&image, size).unwrap();
+        assert!(found.is_light());
+        let shading = found.shading;
         let before = (shading.at(&Vector2::new(10.0, 40.0))
             / shading.at(&Vector2::new(38.0, 20.0)))
             / (lamp(10.0, 40.0) / lamp(38.0, 20.0));
@@ -227,10 +249,10 @@ mod tests {
     fn an_even_mean_and_mere_texture_are_no_shading() {
         let size = (64, 48);
         let even = GreyImage::new(64, 48, vec![100.0; 64 * 48]);
-        assert!(Shading::of_mean(&even, size).is_none());
+        assert!(!MeanShading::fit(&even, size).unwrap().is_light());
         let texture = (0..64 * 48).map(|k: i32| 100.0 + 30.0 * (k as f32 * 12.9898).sin());
         let texture = GreyImage::new(64, 48, texture.collect());
-        assert!(Shading::of_mean(&texture, size).is_none());
+        assert!(!MeanShading::fit(&texture, size).unwrap().is_light());
     }
 
     #[test]

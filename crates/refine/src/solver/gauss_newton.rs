@@ -73,6 +73,7 @@ pub struct SolveState {
     /// Steps taken or given up.
     pub iterations: u64,
     lambda: f64,
+    length: f64,
     cost_start: f64,
     steps: Vec<StepRecord>,
 }
@@ -99,6 +100,8 @@ pub struct SolveState {
 pub struct DampedGaussNewton {
     stopping: Stopping,
     lambda: f64,
+    /// Length of the next undamped step, in Gauss–Newton steps.
+    length: f64,
     /// Cost and equations at the present unknowns; None before the first linearisation.
     current: Option<Linearisation>,
     /// The unknowns at which `current` is.
@@ -114,6 +117,7 @@ impl DampedGaussNewton {
         Self {
             stopping,
             lambda: 0.0,
+            length: 1.0,
             current: None,
             linearised_at: Unknowns::default(),
             cost_start: None,
@@ -126,6 +130,7 @@ impl DampedGaussNewton {
     pub fn resume(stopping: Stopping, state: &SolveState) -> Self {
         Self {
             lambda: state.lambda,
+            length: state.length,
             cost_start: Some(state.cost_start),
             steps: state.steps.clone(),
             ..Self::new(stopping)
@@ -138,6 +143,7 @@ impl DampedGaussNewton {
             unknowns: unknowns.clone(),
             iterations,
             lambda: self.lambda,
+            length: self.length,
             cost_start: self.cost_start.unwrap_or_default(),
             steps: self.steps.clone(),
         }
@@ -217,7 +223,7 @@ impl DampedGaussNewton {
                 self.raise_damping();
                 continue;
             };
-            let length = self.step_length(problem);
+            let length = if self.lambda == 0.0 { self.length } else { 1.0 };
             step.iter_mut().for_each(|step| *step *= length);
             shared *= length;
             let all_feasible = hold_infeasible_frames(problem, frames, &mut step);
@@ -246,9 +252,9 @@ impl DampedGaussNewton {
                 return Ok((candidate, current));
             }
             let next = problem.linearise_at(&candidate)?;
-            let left = slope(&step, &shared, &next).abs();
+            let left = slope(&step, &shared, &next);
             let settles = step_px < problem.pixel_px()
-                && left < (1.0 - MIN_SLOPE_REDUCTION) * decrement
+                && left.abs() < (1.0 - MIN_SLOPE_REDUCTION) * decrement
                 && next.cost < (1.0 + MAX_COST_RISE) * current.cost;
             if next.cost < current.cost || settles {
                 record.cost = Some(next.cost);
@@ -257,6 +263,9 @@ impl DampedGaussNewton {
                 record.curvature = (self.lambda == 0.0 && all_feasible)
                     .then(|| (1.0 - of_poses(&next) / of_poses(&current)) / length);
                 self.steps.push(record);
+                let is_known = record.curvature.is_some() && step_px < problem.pixel_px();
+                let curvature = is_known.then(|| (1.0 + left / decrement) / length);
+                self.length = curvature.map_or(1.0, next_length);
                 self.lower_damping();
                 return Ok((candidate, next));
             }
@@ -290,22 +299,6 @@ impl DampedGaussNewton {
         }
     }
 
-    /// The length of the next step in Gauss–Newton steps: the inverse of the curvature along the
-    /// step before, if that was within a pixel and the gradient changes less along it than the
-    /// normal equations predict. The steps at the end of a solve all follow its weakest
-    /// directions, so that curvatures hardly change from one to the next.
-    ///
-    /// Source: J. Barzilai and J. M. Borwein, "Two-point step size gradient methods", IMA Journal
-    /// of Numerical Analysis 8(1), 1988.
-    fn step_length(&self, problem: &PhotometricProblem) -> f64 {
-        let within_a_pixel = |step: &&StepRecord| step.step_px < problem.pixel_px();
-        let before = self.steps.last().filter(within_a_pixel);
-        match before.and_then(|step| step.curvature) {
-            Some(curvature) if self.lambda == 0.0 => curvature.clamp(MIN_CURVATURE, 1.0).recip(),
-            _ => 1.0,
-        }
-    }
-
     /// The reason for which a step that moves the wall by `step_px` and lowers the quadratic model
     /// by `½ decrement` is the last one, if it is. `unknowns` are those of the frames: the wall's
     /// shape has many more, most of which the prior determines.
@@ -330,6 +323,16 @@ impl DampedGaussNewton {
             0.0
         };
     }
+}
+
+/// The length of the step after one along which the gradient has changed by `curvature` times what
+/// the normal equations predict: the inverse, if it has changed by less. The steps at the end of a
+/// solve all follow its weakest directions, so that curvatures hardly change from one to the next.
+///
+/// Source: J. Barzilai and J. M. Borwein, "Two-point step size gradient methods", IMA Journal of
+/// Numerical Analysis 8(1), 1988.
+fn next_length(curvature: f64) -> f64 {
+    curvature.clamp(MIN_CURVATURE, 1.0).recip()
 }
 
 /// Sets the steps of frames to zero that would become infeasible: one frame that fits nowhere must

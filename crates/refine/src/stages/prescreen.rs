@@ -1,12 +1,12 @@
-//! Stage: rejects frames that show nothing, estimates the common shading and the sensor's noise.
+//! Stage: rejects frames that show nothing, finds a first model of the light and the sensor's noise.
 
 use crate::error::RefineError;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
+use crate::tracking::first_light::first_light;
 use crate::tracking::prescreening;
-use std::sync::Arc;
-use tunnelstitch_core::frames::{CameraLight, Light};
+use tunnelstitch_core::frames::Light;
 
 /// Runs the stage on every frame at the coarsest pyramid level.
 ///
@@ -20,10 +20,10 @@ pub fn run<'a>(
     let context = setup.initial_context(estimation.state.noise);
     let coarsest = setup.coarsest_level();
     let prescreened = prescreening::prescreen(&context, coarsest, session.progress.as_ref())?;
-    if let (Light::Even, Some(shading)) = (setup.frames.light(), prescreened.shading) {
-        setup
-            .frames
-            .set_light(Light::Shaded(Arc::new(CameraLight::common(shading))));
+    if let (Light::Even, Some(mean)) = (setup.frames.light(), &prescreened.mean)
+        && let Some(light) = first_light(&context, mean, coarsest, setup.options.false_alarm_rate)
+    {
+        light.take_over(&context, &[]);
     }
     estimation.state.noise = prescreened.noise;
     estimation.state.frames.rejections = prescreened.rejections;

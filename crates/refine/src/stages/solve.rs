@@ -169,7 +169,8 @@ fn correct_light(
     state: &mut PipelineState,
 ) -> Result<(), ProblemError> {
     let light = setup.frames.camera_light();
-    let has_lamp = light.as_ref().is_some_and(|light| light.lamp.is_some());
+    let lamp = light.as_ref().and_then(|light| light.lamp.as_ref());
+    let has_lamp = lamp.is_some_and(|(lamp, _)| !lamp.is_at_camera());
     let may_have_lamp =
         setup.options.photometry != Photometry::Normalised && !state.is_lamp_ruled_out && !has_lamp;
     let found = match may_have_lamp {

@@ -40,7 +40,7 @@ pub fn find_lamp(
     let lamp = lamp_beside(dark, &views, context, options);
     match lamp.filter(|(_, found)| found.variance.sqrt() < noise) {
         Some((light, _)) => {
-            light.take_over(context, frames);
+            light.take_over(context, &frames.estimates);
             Ok(Some(noise))
         }
         None => {
@@ -61,14 +61,14 @@ fn lamp_beside(
     context: &EstimationContext,
     options: &RefineOptions,
 ) -> Option<(LightModel, PhotometricCalibration)> {
-    let (_, without) = dark.refined(views)?;
+    let (_, without) = dark.refined(views, false)?;
     let at_camera = LightModel {
         lamp: Some(Lamp::at_camera(mean_radius_m(context.surface.as_ref()))),
         ..dark
     };
-    let mut lit = at_camera.refined(views)?;
+    let mut lit = at_camera.refined(views, true)?;
     for _ in 1..MAX_TRACKING_ITERATIONS {
-        lit = lit.0.refined(views)?;
+        lit = lit.0.refined(views, true)?;
     }
     let gain = views.independent() * (without.variance / lit.1.variance).ln();
     let (_, least) = chi_squared_bounds(2.0 * options.false_alarm_rate, LAMP_TERMS as f64)?;

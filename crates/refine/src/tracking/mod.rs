@@ -15,6 +15,7 @@ pub mod alternating_calibration;
 pub mod candidate;
 pub mod correlation_search;
 pub mod correlator;
+pub mod first_light;
 pub mod lamp_search;
 pub mod light_model;
 pub mod mosaic_grid;

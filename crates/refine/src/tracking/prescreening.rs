@@ -1,12 +1,12 @@
-//! Prescreening: rejects frames that show nothing or repeat an earlier picture, and estimates the
-//! common shading and the sensor's noise.
+//! Prescreening: rejects frames that show nothing or repeat an earlier picture, and finds their mean
+//! and the sensor's noise.
 
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::thresholds::correlation_search::MIN_OVERLAP_SHARE;
 use crate::thresholds::prescreening::{MAX_REPEAT_DIFFERENCE_GREY, MIN_CONTRAST_GREY};
-use tunnelstitch_core::frames::{GreyImage, Shading, noise_sigma};
+use tunnelstitch_core::frames::{GreyImage, noise_sigma};
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::viewing_distance;
@@ -20,8 +20,9 @@ const MIN_SHADING_FRAMES: usize = 10;
 pub struct Prescreened {
     /// The rejection reason of every frame that is of no use.
     pub rejections: Vec<Option<RejectionReason>>,
-    /// The shading that all frames have in common, if there is one.
-    pub shading: Option<Shading>,
+    /// The mean of all frames at the coarsest level, each over its own mean, in hundredths; None
+    /// if they are too few to show the light.
+    pub mean: Option<GreyImage>,
     /// 1-σ of the sensor's noise, grey levels: the median over the frames.
     pub noise: f64,
 }
@@ -78,31 +79,16 @@ pub fn prescreen(
         }
     }
     progress.finish();
-    // A hundred times the relative brightness: grey levels of an ordinary picture. Outside the
-    // lens's field of view there is nothing.
-    let camera = context.camera.at_level(coarsest);
-    let mean = sums.iter().enumerate().map(|(k, [sum, n])| {
-        let is_shown = camera
-            .ray((k % size.0) as f64, (k / size.0) as f64)
-            .is_some();
-        if is_shown {
-            (100.0 * sum / n) as f32
-        } else {
-            f32::NAN
-        }
-    });
+    // Hundredths: grey levels of an ordinary picture.
+    let mean = sums.iter().map(|[sum, n]| (100.0 * sum / n) as f32);
     let mean = GreyImage::new(size.0, size.1, mean.collect());
-    let full = (
-        context.camera.width as usize,
-        context.camera.height as usize,
-    );
     let has_enough =
         rejections.iter().filter(|reason| reason.is_none()).count() >= MIN_SHADING_FRAMES;
     noises.sort_unstable_by(f64::total_cmp);
     Ok(Prescreened {
         noise: noises.get(noises.len() / 2).copied().unwrap_or(0.0),
         rejections,
-        shading: has_enough.then(|| Shading::of_mean(&mean, full)).flatten(),
+        mean: has_enough.then_some(mean),
     })
 }
 

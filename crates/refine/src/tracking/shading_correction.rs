@@ -2,7 +2,7 @@
 //! picture.
 //!
 //! The mean over all frames shows the lamp and the lens
-//! ([`tunnelstitch_core::frames::Shading::of_mean`]) up to what is left of the wall's texture in
+//! ([`crate::tracking::first_light`]) up to what is left of the wall's texture in
 //! it: enough to register frames. On a faint wall a shading that is wrong by a grey level is still
 //! steeper than the texture, and it is fixed to the camera: frames get displaced by it. Where
 //! frames overlap, the wall itself determines the shading ([`tunnelstitch_photometry`]): an
@@ -45,7 +45,8 @@ pub fn correct_until_settled(
     for _ in 0..MAX_TRACKING_ITERATIONS {
         let views = TileViews::observe(context, options, frames)?;
         observed = views.pixels();
-        if !correct(context, &views, frames) {
+        // At tracked poses, which are a little off in common, a lamp would be moved far away.
+        if !correct(context, &views, frames, false) {
             break;
         }
         Neighbourhood::of_all(frames).solve(context, options, finest..=coarsest, frames)?;
@@ -64,27 +65,33 @@ pub fn correct_once(
     frames: &FrameStates,
 ) -> Result<(), ProblemError> {
     let views = TileViews::observe(context, options, frames)?;
-    correct(context, &views, frames);
+    correct(context, &views, frames, true);
     Ok(())
 }
 
 /// Corrects the light by what overlapping frames show; false if nothing significant is wrong with
-/// it. A lamp's light over a frame is that of the frame's present pose.
-fn correct(context: &EstimationContext, views: &TileViews, frames: &FrameStates) -> bool {
+/// it. A lamp's light over a frame is that of the frame's present pose; it is moved if
+/// `moves_lamp`.
+fn correct(
+    context: &EstimationContext,
+    views: &TileViews,
+    frames: &FrameStates,
+    moves_lamp: bool,
+) -> bool {
     let sigmas = match context.frames.light() {
         Light::Shaded(_) => MIN_CHANGE_SIGNIFICANCE_SIGMA,
         Light::Even => MIN_SIGNIFICANCE_SIGMA,
         Light::Normalised => return false,
     };
     let before = LightModel::present(context);
-    let Some((after, found)) = before.refined(views) else {
+    let Some((after, found)) = before.refined(views, moves_lamp) else {
         return false;
     };
-    let is_changed = found.is_light_significant(sigmas, before.lamp.is_some());
+    let is_changed = found.is_light_significant(sigmas, moves_lamp && before.lamp.is_some());
     if is_changed {
-        after.take_over(context, frames);
+        after.take_over(context, &frames.estimates);
     } else if before.lamp.is_some() {
-        before.take_over(context, frames);
+        before.take_over(context, &frames.estimates);
     }
     is_changed
 }
@@ -116,7 +123,7 @@ mod tests {
         let context = test_context(&wall, &frames, &prior);
         let states = frame_states(&wall.poses);
         let views = TileViews::observe(&context, &RefineOptions::default(), &states).unwrap();
-        let any = correct(&context, &views, &states);
+        let any = correct(&context, &views, &states, true);
         assert_eq!(any, frames.camera_light().is_some());
         let light = frames.camera_light()?;
         let (w, h) = (f64::from(wall.camera.width), f64::from(wall.camera.height));
