@@ -13,6 +13,7 @@ use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::solve_record::{SolveRecord, StepRecord};
 use crate::solver::stopping::{StopReason, Stopping};
 use crate::thresholds::gauss_newton::{MAX_COST_RISE, MIN_SLOPE_REDUCTION};
+use crate::thresholds::tracking::STEP_TOLERANCE_PX;
 use serde::{Deserialize, Serialize};
 
 /// Factor from one damping to the next.
@@ -263,7 +264,7 @@ impl DampedGaussNewton {
                 record.curvature = (self.lambda == 0.0 && all_feasible)
                     .then(|| (1.0 - of_poses(&next) / of_poses(&current)) / length);
                 self.steps.push(record);
-                let is_known = record.curvature.is_some() && step_px < problem.pixel_px();
+                let is_known = record.curvature.is_some() && step_px < STEP_TOLERANCE_PX;
                 let curvature = is_known.then(|| (1.0 + left / decrement) / length);
                 self.length = curvature.map_or(1.0, next_length);
                 self.lower_damping();
@@ -327,7 +328,8 @@ impl DampedGaussNewton {
 
 /// The length of the step after one along which the gradient has changed by `curvature` times what
 /// the normal equations predict: the inverse, if it has changed by less. The steps at the end of a
-/// solve all follow its weakest directions, so that curvatures hardly change from one to the next.
+/// solve all follow its weakest directions, so that curvatures hardly change from one to the next;
+/// those of [`STEP_TOLERANCE_PX`] and more do not.
 ///
 /// Source: J. Barzilai and J. M. Borwein, "Two-point step size gradient methods", IMA Journal of
 /// Numerical Analysis 8(1), 1988.
