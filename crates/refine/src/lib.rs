@@ -11,7 +11,7 @@
 //!
 //! | stage | what it does | works with |
 //! | --- | --- | --- |
-//! | [`prescreen`](stages::prescreen) | rejects useless frames; common shading, sensor noise | [`tracking::prescreening`] |
+//! | [`prescreen`](stages::prescreen) | rejects useless frames; first model of the light, sensor noise | [`tracking::prescreening`], [`tracking::first_light`] |
 //! | [`track`](stages::track) | registers one frame after another on the wall that its predecessors show; sliding windows | [`tracking`] |
 //! | [`correct_shading`](stages::correct_shading) | light that moves with the camera, from the overlaps | [`tunnelstitch_photometry`] |
 //! | [`solve`](stages::solve) | all frames together, at full size | [`problem`], [`solver`] |

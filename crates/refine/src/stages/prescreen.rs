@@ -1,4 +1,5 @@
-//! Stage: rejects frames that show nothing, finds a first model of the light and the sensor's noise.
+//! Stage: rejects frames that show nothing, and finds a first model of the light and the sensor's
+//! noise.
 
 use crate::error::RefineError;
 use crate::stages::session::Session;

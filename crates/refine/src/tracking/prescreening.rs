@@ -1,5 +1,5 @@
-//! Prescreening: rejects frames that show nothing or repeat an earlier picture, and finds their mean
-//! and the sensor's noise.
+//! Prescreening: rejects frames that show nothing or repeat an earlier picture, and finds the mean
+//! of the others and the sensor's noise.
 
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
