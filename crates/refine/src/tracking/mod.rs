@@ -5,11 +5,12 @@
 //!  (first_light)  (shading_correction)            └→ windows
 //! ```
 //!
-//! Prescreening rejects frames that show nothing; the mean of the others shows the light. Tracking registers one frame after another: the
-//! prior predicts a pose, the correlation search compares the unwrapped frame with a reference
-//! mosaic of its neighbours, and the hypotheses are refined and chosen from. Sliding windows keep
-//! the error bounded. While shading or camera are only roughly known, tracking alternates with
-//! their calibration. [`lamp_search`] finds a lamp once poses are good.
+//! Prescreening rejects frames that show nothing; the mean of the others shows the light.
+//! Tracking registers one frame after another: the prior predicts a pose, the correlation search
+//! compares the unwrapped frame with a reference mosaic of its neighbours, and the hypotheses are
+//! refined and chosen from. Sliding windows keep the error bounded. While shading or camera are
+//! only roughly known, tracking alternates with their calibration. [`lamp_search`] finds a lamp
+//! once poses are good.
 
 pub mod alternating_calibration;
 pub mod candidate;

@@ -9,12 +9,13 @@
 //!
 //! that minimises `Σ q ω (a I_a(x) + b − I_b(x + d(x)))²` at a fine pyramid level, with the
 //! exposure a, b, the biweight ω of [`crate::tiles::residual_weighting::Loss`] for what is not
-//! wall, and the pixels q of a sample in the frame that resolves less of it. With N the normal matrix,
-//! corrected for the noise in its slopes, and v the variance of the residuals, P has the covariance
-//! `v N⁻¹` if they are noise. Glints are not: steeper than a faint wall, they move with the camera.
-//! So the influence of every sample is bounded to that of one a few times as steep as the median.
-//! With g the contributions of n patches of samples to the gradient, the covariance is
-//! `C = n/(n − 8) N⁻¹ (Σ g gᵀ) N⁻¹` where that makes σ larger, whatever the residuals are like.
+//! wall, and the pixels q of a sample in the frame that resolves less of it. With N the normal
+//! matrix, corrected for the noise in its slopes, and v the variance of the residuals, P has the
+//! covariance `v N⁻¹` if they are noise. Glints are not: steeper than a faint wall, they move
+//! with the camera. So the influence of every sample is bounded to that of one a few times as
+//! steep as the median. With g the contributions of n patches of samples to the gradient, the
+//! covariance is `C = n/(n − 8) N⁻¹ (Σ g gᵀ) N⁻¹` where that makes σ larger, whatever the
+//! residuals are like.
 //!
 //! The root mean square of the displacement over the overlap is `e = √(pᵀWp)`, to which errors
 //! alone contribute `σ = √tr(C W)`. By the triangle inequality, frames that are aligned to τ show
