@@ -368,3 +368,16 @@ fn slope(step: &[FrameStep], shared: &Kappa, at: &Linearisation) -> f64 {
     let of_shared = border.map_or(0.0, |border| shared.dot(&border.gradient));
     slots_slope(step, at, FRAME_PARAMETERS) + of_shared
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With half of the predicted curvature a step goes half of the way: the next one twice as far,
+    /// and no farther. With more than that the step stays whole.
+    #[test]
+    fn steps_are_lengthened_by_missing_curvature_up_to_twofold() {
+        assert_eq!([0.8, 0.5].map(next_length), [1.25, 2.0]);
+        assert_eq!([1.0, 1.4, -0.3].map(next_length), [1.0, 1.0, 2.0]);
+    }
+}

@@ -61,7 +61,7 @@ pub fn first_light(
 }
 
 /// The mean light of a lamp over a few frames at their initial poses, at every pixel of `camera`;
-/// None where one of them shows no wall in range.
+/// None where none of them shows wall in range.
 fn mean_falloff(context: &EstimationContext, camera: &Camera, lamp: &Lamp) -> Vec<Option<f64>> {
     let surface = context.surface.as_ref();
     let initial = &context.prior.initial;
@@ -77,8 +77,11 @@ fn mean_falloff(context: &EstimationContext, camera: &Camera, lamp: &Lamp) -> Ve
     let width = camera.width as usize;
     (0..width * camera.height as usize).par_map(|k| {
         let pixel = Vector2::new((k % width) as f64, (k / width) as f64);
-        let sum: Option<f64> = poses.iter().map(|pose| light(pose, &pixel)).sum();
-        Some(sum? / poses.len() as f64)
+        let seen: Vec<f64> = poses
+            .iter()
+            .filter_map(|pose| light(pose, &pixel))
+            .collect();
+        (!seen.is_empty()).then(|| seen.iter().sum::<f64>() / seen.len() as f64)
     })
 }
 
