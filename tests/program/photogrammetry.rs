@@ -209,21 +209,26 @@ fn every_program_has_the_same_poses() {
     }
 }
 
-/// `init` finds a file with poses and a camera in it, and a lens profile's readout time is named.
-#[test]
-fn init_finds_poses_and_cameras_in_one_file() {
-    let survey = first_frames(4);
-    let dir = survey.path();
-    let truth = tum::read(&dir.join("groundtruth.tum")).unwrap();
-    let truth: Vec<Pose> = truth.iter().map(|stamped| stamped.pose).collect();
+/// Removes all of a survey but its frames, and returns their true poses.
+fn leave_frames(survey: &Path) -> Vec<Pose> {
+    let truth = tum::read(&survey.join("groundtruth.tum")).unwrap();
     for file in [
         "survey.toml",
         "camera.json",
         "baseline.tum",
         "groundtruth.tum",
     ] {
-        std::fs::remove_file(dir.join(file)).unwrap();
+        std::fs::remove_file(survey.join(file)).unwrap();
     }
+    truth.iter().map(|stamped| stamped.pose).collect()
+}
+
+/// `init` finds a file with poses and a camera in it, and a lens profile's readout time is named.
+#[test]
+fn init_finds_poses_and_cameras_in_one_file() {
+    let survey = first_frames(4);
+    let dir = survey.path();
+    let truth = leave_frames(dir);
     std::fs::write(dir.join("reconstruction.json"), opensfm(&truth)).unwrap();
     succeed(&["init", text(dir), "--radius-m", "3"]);
     let toml = std::fs::read_to_string(dir.join("survey.toml")).unwrap();
@@ -259,16 +264,7 @@ fn init_finds_poses_and_cameras_in_one_file() {
 fn init_takes_the_size_of_a_bundle_files_camera_from_the_frames() {
     let survey = first_frames(4);
     let dir = survey.path();
-    let truth = tum::read(&dir.join("groundtruth.tum")).unwrap();
-    let truth: Vec<Pose> = truth.iter().map(|stamped| stamped.pose).collect();
-    for file in [
-        "survey.toml",
-        "camera.json",
-        "baseline.tum",
-        "groundtruth.tum",
-    ] {
-        std::fs::remove_file(dir.join(file)).unwrap();
-    }
+    let truth = leave_frames(dir);
     let names: Vec<String> = (0..4).map(|k| format!("./{}.jpg 0 400", name(k))).collect();
     std::fs::write(dir.join("list.txt"), names.join("\n")).unwrap();
     std::fs::write(dir.join("bundle.out"), bundle(&truth)).unwrap();

@@ -84,6 +84,19 @@ impl Lamp {
     pub fn log_at(&self, pose: &Pose, x_w: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
         self.log_falloff(pose, x_w, normal).0
     }
+
+    /// `ln L` at the wall point that a pixel of `camera` shows; None if it shows no wall in range.
+    pub fn log_seen_at(
+        &self,
+        pixel: &Vector2<f64>,
+        surface: &dyn Surface,
+        camera: &Camera,
+        pose: &Pose,
+    ) -> Option<f64> {
+        let ray = camera.ray(pixel.x, pixel.y)?;
+        let hit = sighted_wall(surface, camera, pose, &ray).ok()?;
+        Some(self.log_at(pose, &hit.x_w, &surface.frame(hit.wall).normal()))
+    }
 }
 
 /// The falloff of a lamp's light over a frame, `ln L`, on a grid of the picture.
@@ -103,11 +116,9 @@ impl Falloff {
         let log = |k: usize| {
             let u = (k % columns) as f64 / (columns - 1) as f64 * (size.0 - 1) as f64;
             let v = (k / columns) as f64 / (rows - 1) as f64 * (size.1 - 1) as f64;
-            let hit = camera
-                .ray(u, v)
-                .and_then(|ray| sighted_wall(surface, camera, pose, &ray).ok());
-            if let Some(hit) = hit {
-                last = lamp.log_at(pose, &hit.x_w, &surface.frame(hit.wall).normal()) as f32;
+            let seen = lamp.log_seen_at(&Vector2::new(u, v), surface, camera, pose);
+            if let Some(seen) = seen {
+                last = seen as f32;
             }
             last
         };

@@ -3,6 +3,7 @@
 use super::error::SurfaceError;
 use super::shape::Surface;
 use super::sight::sighted_wall;
+use super::wall::WallPoint;
 use crate::camera::Camera;
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
@@ -173,19 +174,18 @@ impl Footprint {
         self.widened(pixel_m + 0.02 * span_m)
     }
 
-    /// The point in the middle of the box.
-    pub fn middle(&self) -> Self {
-        let middle = |from: f64, to: f64| 0.5 * (from + to);
-        let (s_m, h_m) = (
-            middle(self.s_min_m, self.s_max_m),
-            middle(self.h_min_m, self.h_max_m),
-        );
-        Self {
-            s_min_m: s_m,
-            s_max_m: s_m,
-            h_min_m: h_m,
-            h_max_m: h_m,
+    /// The point in the middle of the box; its arc length may be beyond the perimeter, as theirs.
+    pub fn middle(&self) -> WallPoint {
+        WallPoint {
+            s_m: 0.5 * (self.s_min_m + self.s_max_m),
+            h_m: 0.5 * (self.h_min_m + self.h_max_m),
         }
+    }
+
+    /// True if a point lies in the box, modulo turns around the tunnel.
+    pub fn contains(&self, point: &WallPoint, perimeter_m: f64) -> bool {
+        let behind = (point.s_m - self.s_min_m).rem_euclid(perimeter_m);
+        (self.h_min_m..=self.h_max_m).contains(&point.h_m) && behind <= self.s_max_m - self.s_min_m
     }
 
     /// The box enlarged by `margin_m` on every side, metres.

@@ -23,4 +23,5 @@ pub mod sampling;
 pub mod tile_candidates;
 pub mod tile_coverage;
 pub mod tile_projection;
+pub mod viewpoint;
 pub mod visibility;

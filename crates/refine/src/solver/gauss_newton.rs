@@ -260,13 +260,16 @@ impl DampedGaussNewton {
             if next.cost < current.cost || settles {
                 record.cost = Some(next.cost);
                 // An undamped step is δ = −α H⁻¹ g, with its length α.
+                let is_whole = self.lambda == 0.0 && all_feasible;
+                let curvature = |before: f64, after: f64| (1.0 - after / before) / length;
                 let of_poses = |at| slots_slope(&step[..frames.len()], at, 6);
-                record.curvature = (self.lambda == 0.0 && all_feasible)
-                    .then(|| (1.0 - of_poses(&next) / of_poses(&current)) / length);
+                record.curvature = is_whole.then(|| curvature(of_poses(&current), of_poses(&next)));
                 self.steps.push(record);
-                let is_known = record.curvature.is_some() && step_px < STEP_TOLERANCE_PX;
-                let curvature = is_known.then(|| (1.0 + left / decrement) / length);
-                self.length = curvature.map_or(1.0, next_length);
+                self.length = if is_whole && step_px < STEP_TOLERANCE_PX {
+                    next_length(curvature(-decrement, left))
+                } else {
+                    1.0
+                };
                 self.lower_damping();
                 return Ok((candidate, next));
             }

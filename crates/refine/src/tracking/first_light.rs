@@ -12,7 +12,7 @@ use nalgebra::Vector2;
 use tunnelstitch_core::frames::{GreyImage, Lamp, MeanShading, Shading};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-use tunnelstitch_geometry::surface::{mean_radius_m, sighted_wall};
+use tunnelstitch_geometry::surface::mean_radius_m;
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// Frames whose falloffs make that of the mean: their poses differ by the jitter only.
@@ -68,19 +68,12 @@ fn mean_falloff(context: &EstimationContext, camera: &Camera, lamp: &Lamp) -> Ve
     let poses: Vec<&Pose> = (initial.iter())
         .step_by(initial.len().div_ceil(MEAN_FRAMES).max(1))
         .collect();
-    let light = |pose: &Pose, pixel: &Vector2<f64>| {
-        let ray = camera.ray(pixel.x, pixel.y)?;
-        let hit = sighted_wall(surface, camera, pose, &ray).ok()?;
-        let normal = surface.frame(hit.wall).normal();
-        Some(lamp.log_at(pose, &hit.x_w, &normal).exp())
-    };
     let width = camera.width as usize;
     (0..width * camera.height as usize).par_map(|k| {
         let pixel = Vector2::new((k % width) as f64, (k / width) as f64);
-        let seen: Vec<f64> = poses
-            .iter()
-            .filter_map(|pose| light(pose, &pixel))
-            .collect();
+        let logs = poses.iter();
+        let logs = logs.filter_map(|pose| lamp.log_seen_at(&pixel, surface, camera, pose));
+        let seen: Vec<f64> = logs.map(f64::exp).collect();
         (!seen.is_empty()).then(|| seen.iter().sum::<f64>() / seen.len() as f64)
     })
 }

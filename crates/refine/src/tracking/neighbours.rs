@@ -60,7 +60,7 @@ impl Neighbours<'_> {
             .collect();
         found.sort_by_key(|k| k.abs_diff(place));
         let middle = own.middle();
-        let shows_middle = |k: &&usize| self.footprints[**k].overlaps(&middle, perimeter);
+        let shows_middle = |k: &&usize| self.footprints[**k].contains(&middle, perimeter);
         let depth = found.iter().filter(shows_middle).count();
         let mut overlapping = vec![false; self.registered.len()];
         let step = depth.div_ceil(MAX_FUSED_FRAMES).max(1);

@@ -3,7 +3,8 @@
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::samples::footprints::{MIN_RESOLVED_SHARE, RESOLVED_RANGE_RADII};
+use crate::samples::footprints::RESOLVED_RANGE_RADII;
+use crate::samples::viewpoint::Viewpoint;
 use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
 use crate::tracking::ncc_score::NccScore;
 use crate::tracking::unwrapped_frame::{UnwrappedFrame, UnwrappedSampler};
@@ -30,27 +31,6 @@ pub struct ReferenceMosaic {
     grey: Vec<f32>,
     /// True for points that the frame to be registered resolves from its predicted pose.
     pub is_resolved: Vec<bool>,
-}
-
-/// A camera position, from which walls that are far off or oblique are hardly resolved.
-struct Viewpoint {
-    /// The camera's centre relative to the origin, metres.
-    centre: Vector3<f32>,
-    radius_m: f32,
-}
-
-impl Viewpoint {
-    /// True if a wall point with this normal is seen with at least the share [`MIN_RESOLVED_SHARE`]
-    /// of the pixels that it has when seen squarely from the axis.
-    ///
-    /// At distance d and angle β to the normal the share is `cos β (r/d)²`.
-    #[inline]
-    fn resolves(&self, point: &[f32; 3], normal: &Vector3<f32>) -> bool {
-        let ray = Vector3::from(*point) - self.centre;
-        let square = ray.norm_squared();
-        ray.dot(normal).abs() * self.radius_m * self.radius_m
-            > MIN_RESOLVED_SHARE as f32 * square * square.sqrt()
-    }
 }
 
 /// A registered frame that the mosaic is fused from.
@@ -84,10 +64,7 @@ impl ReferenceMosaic {
             .widened(margin_m);
         let spacing_m = pixel_size_m(context, camera, pose);
         let grid = MosaicGrid::over(&footprint, spacing_m);
-        let middle = WallPoint {
-            s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
-            h_m: 0.5 * (footprint.h_min_m + footprint.h_max_m),
-        };
+        let middle = footprint.middle();
         let origin = context.surface.frame(middle).x_w;
         let normals = column_normals(context, &grid, middle.h_m);
         let points: Vec<[f32; 3]> = grid
@@ -95,10 +72,7 @@ impl ReferenceMosaic {
             .iter()
             .map(|x_w| (x_w - origin).cast().into())
             .collect();
-        let viewpoint = |pose: &Pose| Viewpoint {
-            centre: (pose.t_wc - origin).cast(),
-            radius_m: radius_m as f32,
-        };
+        let viewpoint = |pose: &Pose| Viewpoint::new(pose, &origin, radius_m);
         let resolves = |viewpoint: &Viewpoint, k: usize| {
             viewpoint.resolves(&points[k], &normals[k % grid.columns])
         };

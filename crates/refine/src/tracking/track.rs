@@ -125,6 +125,22 @@ impl Tracking {
             .push(footprint(context, &context.camera, k, &predicted.pose)?);
         let first = find_earliest_overlap(context, &self.footprints);
         let is_reliable = self.register(context, options, &predicted, first)?;
+        self.solve_windows(context, options, first, is_reliable)?;
+        let pose = &self.states.estimates[k].pose;
+        self.footprints[k] = footprint(context, &context.camera, k, pose)?;
+        Ok(())
+    }
+
+    /// Solves the windows that end with the last frame, if they are due; `first`: the first frame
+    /// that it may share wall with, `is_reliable`: of its pose.
+    fn solve_windows(
+        &mut self,
+        context: &EstimationContext,
+        options: &RefineOptions,
+        first: usize,
+        is_reliable: bool,
+    ) -> Result<(), ProblemError> {
+        let k = self.tracked_frames() - 1;
         // The frame overlaps earlier frames than the one before it did: a turn has closed on wall
         // that was tracked without it, and the drift in between may be many pixels.
         let closes_turn = first < self.earliest_overlap;
@@ -147,8 +163,6 @@ impl Tracking {
                 solve_long_window(context, options, &mut self.states)?;
             }
         }
-        let pose = &self.states.estimates[k].pose;
-        self.footprints[k] = footprint(context, &context.camera, k, pose)?;
         Ok(())
     }
 

@@ -2,6 +2,7 @@
 
 use crate::model::context::EstimationContext;
 use crate::samples::point_sampler::PointSampler;
+use crate::samples::viewpoint::Viewpoint;
 use crate::thresholds::assessment::MIN_PIXEL_SHARE;
 use crate::thresholds::pairwise_lucas_kanade::{
     MAX_DISPLACEMENT_PX, MAX_SQUARED_SLOPE_RATIO, STRIDE_PX,
@@ -15,7 +16,7 @@ use nalgebra::{Vector3, Vector6};
 use tunnelstitch_core::frames::{Pyramid, noise_at_level};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
-use tunnelstitch_geometry::surface::{Footprint, WallPoint};
+use tunnelstitch_geometry::surface::Footprint;
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// Samples along the side of a patch: larger than most glints.
@@ -49,25 +50,6 @@ impl PosedImage<'_> {
         let image = self.pyramid.level(self.level);
         move |point| sampler.project(point)?.sample_valid(image)
     }
-
-    /// A function from wall points relative to `origin` and the wall's tangents there to the area
-    /// that a piece of the wall has in the frame, over that of the piece seen squarely from
-    /// `distance_m` away, at most 1: `cos β (distance/d)²` at distance d and angle β to the normal.
-    fn pixels_at(
-        &self,
-        origin: &Vector3<f64>,
-        distance_m: f64,
-    ) -> impl Fn(&TemplateSample) -> f32 + use<> {
-        let centre: Vector3<f32> = (self.pose.t_wc - origin).cast();
-        let square_m = (distance_m * distance_m) as f32;
-        move |sample| {
-            let ray = Vector3::from(sample.point) - centre;
-            let normal = Vector3::from(sample.e_s).cross(&Vector3::from(sample.e_h));
-            let square = ray.norm_squared();
-            let cosine = ray.dot(&normal).abs() / (normal.norm_squared() * square).sqrt();
-            (cosine * square_m / square).min(1.0)
-        }
-    }
 }
 
 /// A frame on the wall, to be aligned with others.
@@ -98,10 +80,7 @@ impl Template {
         let context = image.context;
         let pixel_size_m = pixel_size_m(context, &image.camera, image.pose);
         let grid = MosaicGrid::over(footprint, STRIDE_PX * pixel_size_m);
-        let middle = WallPoint {
-            s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
-            h_m: 0.5 * (footprint.h_min_m + footprint.h_max_m),
-        };
+        let middle = footprint.middle();
         let origin = context.surface.frame(middle).x_w;
         let grey = image.grey_at(&origin);
         let mut samples = Vec::new();
@@ -151,11 +130,12 @@ impl Template {
         }
         bound_influence(&mut samples);
         let distance_m = pixel_size_m * image.camera.vertical_focal_px();
-        let pixels_at = image.pixels_at(&origin, distance_m);
+        let viewpoint = Viewpoint::new(image.pose, &origin, distance_m);
+        let pixels = samples.iter().map(|sample| pixels(&viewpoint, sample));
         let noise = context.noise * context.noise * noise_at_level(image.level);
         Self {
             origin,
-            pixels: samples.iter().map(pixels_at).collect(),
+            pixels: pixels.collect(),
             samples,
             distance_m,
             patches: grid.rows.div_ceil(PATCH) * patch_columns,
@@ -174,14 +154,14 @@ impl Template {
     /// are right.
     pub fn align(&self, other: &PosedImage) -> Option<Alignment> {
         let grey = other.grey_at(&self.origin);
-        let pixels = other.pixels_at(&self.origin, self.distance_m);
+        let viewpoint = Viewpoint::new(other.pose, &self.origin, self.distance_m);
         let mut p = Vector6::<f64>::zeros();
         let mut exposure: Option<(f64, f64)> = None;
         let mut correlation = None;
         let mut first = None;
         let mut result = None;
         for _ in 0..MAX_SOLVE_ITERATIONS {
-            let shared = self.sample_displaced(&p, &grey, &pixels);
+            let shared = self.sample_displaced(&p, &grey, &viewpoint);
             let min_samples = (MIN_PIXEL_SHARE * self.samples.len() as f64).max(MIN_SAMPLES);
             if (shared.len() as f64) < min_samples {
                 return None;
@@ -237,7 +217,7 @@ impl Template {
         &self,
         p: &Vector6<f64>,
         grey: impl Fn(&[f32; 3]) -> Option<f32>,
-        pixels: impl Fn(&TemplateSample) -> f32,
+        viewpoint: &Viewpoint,
     ) -> Vec<SharedSample<'_>> {
         let mut shared = Vec::with_capacity(self.samples.len());
         let field: [f32; 6] = (p * self.pixel_size_m).cast::<f32>().into();
@@ -250,7 +230,7 @@ impl Template {
                 shared.push(SharedSample {
                     sample,
                     value,
-                    pixels: pixels(sample).min(*own_pixels),
+                    pixels: pixels(viewpoint, sample).min(*own_pixels),
                 });
             }
         }
@@ -270,6 +250,14 @@ impl Template {
             .max(2.0 * self.noise)
             .max(MIN_RESIDUAL_VARIANCE)
     }
+}
+
+/// The pixels that a sample has from a viewpoint, at most 1 ([`SharedSample::pixels`]).
+fn pixels(viewpoint: &Viewpoint, sample: &TemplateSample) -> f32 {
+    let normal = Vector3::from(sample.e_s).cross(&Vector3::from(sample.e_h));
+    viewpoint
+        .area_share(&sample.point, &normal.normalize())
+        .min(1.0)
 }
 
 /// Weighs steep samples such that none has more influence than `√MAX_SQUARED_SLOPE_RATIO` times
@@ -312,45 +300,4 @@ fn compute_correlation(shared: &[SharedSample]) -> f64 {
     let spread = (xx - x * x / n) * (yy - y * y / n);
     let of_all = (xy - x * y / n) / spread.sqrt().max(f64::MIN_POSITIVE);
     of_all.max(robust_correlation(&pairs))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::test_scene::with_context;
-    use tunnelstitch_core::test_wall::{TestWall, waves};
-    use tunnelstitch_geometry::surface::Surface;
-    use tunnelstitch_geometry::trajectory::Pose;
-
-    /// From the axis, a radius of wall farther along, at 45°: `cos 45° (1/√2)²`.
-    #[test]
-    fn pixels_are_fewer_far_along_the_tunnel() {
-        let wall = TestWall::ring(waves);
-        let radius_m = wall.circle.perimeter_m() / std::f64::consts::TAU;
-        with_context(&wall, wall.frames(), &wall.poses, |context, _| {
-            let image = PosedImage {
-                context,
-                level: 0,
-                camera: context.camera,
-                pyramid: &context.frames.get(0).unwrap(),
-                pose: &Pose::identity(),
-            };
-            let pixels = image.pixels_at(&Vector3::zeros(), radius_m);
-            let at = |h_m: f64| {
-                let frame = wall.circle.frame(WallPoint { s_m: 0.3, h_m });
-                pixels(&TemplateSample {
-                    point: frame.x_w.cast().into(),
-                    e_s: frame.e_s.cast().into(),
-                    e_h: frame.e_h.cast().into(),
-                    x: [1.0, 0.0, 0.0],
-                    grey: 0.0,
-                    slope: [0.0; 2],
-                    influence_weight: 1.0,
-                    patch: 0,
-                })
-            };
-            assert!((at(0.0) - 1.0).abs() < 1e-5);
-            assert!((at(radius_m) - 0.5f32.powf(1.5)).abs() < 1e-5);
-        });
-    }
 }

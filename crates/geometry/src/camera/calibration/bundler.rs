@@ -12,7 +12,7 @@ use super::coefficients::brown_conrady;
 use super::error::ParseError;
 use super::per_picture::select_shared;
 use super::picture_size::{PictureSize, needed};
-use super::words::{filled_lines, finite};
+use super::words::{data_lines, finite};
 use crate::camera::projection::Camera;
 
 /// Begin of the file's first line.
@@ -37,7 +37,7 @@ pub fn read(text: &str, name: Option<&str>, size: PictureSize) -> Result<Camera,
 
 /// Focal length and coefficients of each camera with a pose, with its number.
 fn cameras(text: &str) -> Result<Vec<(String, [f64; 3])>, ParseError> {
-    let lines = filled_lines(text).filter(|(_, line)| !line.starts_with('#'));
+    let lines = data_lines(text);
     let mut words = lines.flat_map(|(number, line)| {
         let words = line.split_whitespace();
         words.map(move |word| (number, word))

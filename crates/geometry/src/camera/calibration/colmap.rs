@@ -3,19 +3,12 @@
 use super::coefficients::{brown_conrady, eucm, fov, kannala_brandt, thin_prism_fisheye};
 use super::error::ParseError;
 use super::selection::select_camera;
+use super::words::data_lines;
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
 
 /// Creates a lens from its coefficients.
 type ReadLens = fn(&[f64]) -> Result<Lens, ParseError>;
-
-/// The cameras' lines with their numbers from 1.
-fn camera_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let lines = text.lines().enumerate();
-    lines
-        .map(|(k, line)| (k + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-}
 
 /// True for a file with lines of which none has a name where a camera has its model.
 pub fn has_no_model(text: &str) -> bool {
@@ -23,14 +16,14 @@ pub fn has_no_model(text: &str) -> bool {
         let second = line.split_whitespace().nth(1).unwrap_or_default();
         second.starts_with(|first: char| first.is_ascii_alphabetic())
     };
-    let mut lines = camera_lines(text).peekable();
+    let mut lines = data_lines(text).peekable();
     lines.peek().is_some() && !lines.any(|(_, line)| has_name(line))
 }
 
 /// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixel coordinates are counted from the corner of
 /// the first pixel and converted.
 pub fn read(text: &str, name: Option<&str>) -> Result<Camera, ParseError> {
-    let cameras: Vec<_> = camera_lines(text)
+    let cameras: Vec<_> = data_lines(text)
         .map(|(number, line)| {
             let id = line
                 .split_whitespace()

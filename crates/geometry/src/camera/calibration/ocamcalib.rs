@@ -1,6 +1,7 @@
 //! OCamCalib's `calib_results.txt`.
 
 use super::error::ParseError;
+use super::words::data_lines;
 use crate::camera::lens::Lens;
 use crate::camera::ocam::{OCAM_COEFFICIENTS, Ocam};
 use crate::camera::projection::Camera;
@@ -8,17 +9,9 @@ use crate::camera::projection::Camera;
 /// Lines of numbers: polynomial, inverse polynomial, centre, affine part, size.
 const LINES: usize = 5;
 
-/// The lines that hold something, with their numbers from 1.
-fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let lines = text.lines().enumerate();
-    lines
-        .map(|(k, line)| (k + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-}
-
 /// True for five lines of numbers of which the first begins with the count of its others.
 pub fn is_ocamcalib(text: &str) -> bool {
-    let mut all = lines(text);
+    let mut all = data_lines(text);
     let Some((_, first)) = all.next() else {
         return false;
     };
@@ -35,7 +28,7 @@ pub fn is_ocamcalib(text: &str) -> bool {
 /// The centre of the first pixel is (0, 0). The polynomial is stored in focal lengths, `f = −a0`:
 /// `g = −(a0 + a2 r² + a3 r³ + …)/f`, `r = f ρ`.
 pub fn read(text: &str) -> Result<Camera, ParseError> {
-    let lines: Vec<(usize, &str)> = lines(text).collect();
+    let lines: Vec<(usize, &str)> = data_lines(text).collect();
     let [direct, _, centre, affine, size] = lines[..] else {
         return Err(ParseError::new(format!(
             "a calibration of OCamCalib has {LINES} lines of numbers, not {}",

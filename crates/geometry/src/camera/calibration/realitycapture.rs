@@ -17,7 +17,7 @@ use super::coefficients::brown_conrady;
 use super::error::ParseError;
 use super::per_picture::select_shared;
 use super::picture_size::{PictureSize, needed};
-use super::words::{filled_lines, finite};
+use super::words::{data_lines, filled_lines, finite};
 use crate::camera::projection::Camera;
 use csv::{ReaderBuilder, StringRecord, Trim};
 
@@ -53,7 +53,7 @@ pub fn is_table(text: &str) -> bool {
 /// Reads the calibration that all cameras share, or that of the picture of this name.
 pub fn read(text: &str, name: Option<&str>, size: PictureSize) -> Result<Camera, ParseError> {
     let header = header(text).ok_or_else(|| ParseError::new("no comment names its columns"))?;
-    let rows = filled_lines(text).filter(|(_, line)| !line.starts_with('#'));
+    let rows = data_lines(text);
     let rows: Result<Vec<_>, ParseError> = rows.map(|row| camera_row(row, &header)).collect();
     let [f, px, py, k1, k2, k3, k4, t1, t2] = select_shared(rows?, name)?;
     if k4 != 0.0 {

@@ -10,6 +10,11 @@ pub fn filled_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .filter(|(_, line)| !line.is_empty())
 }
 
+/// The lines with content that are no comments, which begin with #, and their 1-based numbers.
+pub fn data_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    filled_lines(text).filter(|(_, line)| !line.starts_with('#'))
+}
+
 /// The finite number that a word of a line is.
 pub fn finite(word: &str, line: usize) -> Result<f64, ParseError> {
     let value = word.parse::<f64>().ok().filter(|value| value.is_finite());
