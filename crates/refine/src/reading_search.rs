@@ -3,7 +3,8 @@
 //! In a round tunnel a camera on the axis looks at the wall in every convention of its poses, in
 //! either order of them, and with quaternions that begin with w. The geometry cannot tell these
 //! apart, but neighbouring frames can: read rightly, each is found on the wall that the one before
-//! it shows, within what the prior allows ([`register_frame`]).
+//! it shows, within what the prior allows
+//! ([`crate::tracking::registration::register_frame`]).
 
 use crate::error::RefineError;
 use crate::input::RefineInput;
@@ -12,12 +13,10 @@ use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::samples::footprints::footprints;
 use crate::stages::setup::Setup;
-use crate::tracking::neighbours::Neighbours;
-use crate::tracking::pose_prediction::PosePrediction;
+use crate::tracking::neighbour_pairs::{first_frames, register_pairs};
 use crate::tracking::prescreening::prescreen;
-use crate::tracking::registration::{Effort, MAX_DEVIATION_COST, register_frame};
+use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
 use image::DynamicImage;
 use tunnelstitch_core::frames::{FrameSet, Light, load_colour};
 use tunnelstitch_core::progress::Silent;
@@ -25,16 +24,8 @@ use tunnelstitch_core::survey::{PoseReading, Survey, SurveyError};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::trajectory::StampedPose;
 
-/// Largest number of pairs of neighbouring frames that are looked at: bounds the time.
-const MAX_PAIRS: usize = 12;
 /// Smallest number of pairs: fewer may fit by chance.
 const MIN_PAIRS: usize = 4;
-/// Pairs that are registered at once; after each batch a reading that cannot be taken any more is
-/// given up.
-const PAIRS_AT_ONCE: usize = 4;
-/// Hypotheses of a frame's pose that are refined: neighbours at the right reading overlap by much,
-/// so that the right one is among the best.
-const MAX_PAIR_HYPOTHESES: usize = 2;
 /// Evidence below that of the best reading with which another is named beside it, nats: odds of one
 /// to twenty.
 const MAX_DEFICIT_NATS: f64 = 3.0;
@@ -97,8 +88,8 @@ impl FittingReadings {
 ///
 /// A frame is registered on the wall that the one before it shows, as tracking does, from the
 /// reading's pose and within its prior. Where it is found in both readings, the evidence against
-/// the one given is by how much less the frame deviates from the prior, `½ eᵀΣ⁻¹e`; the pixels are
-/// the same. A reading is taken if three quarters of the pairs fit and speak for it, and its odds
+/// the one given is by how much less the frame deviates from the prior, `½ eᵀΣ⁻¹e`, and by how much
+/// better it correlates, which it does with another focal length alone. A reading is taken if three quarters of the pairs fit and speak for it, and its odds
 /// exceed the number of readings over the survey's rate of false alarms. There may be several:
 /// poses exactly as planned, seen from the tunnel's other end, are those of another convention.
 ///
@@ -123,9 +114,9 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
     let mut found = Vec::new();
     for reading in readings {
         let registered = pictures.register(survey, &reading, |some| comparison.may_take(some))?;
-        if comparison.may_take(&registered) {
+        let log_odds = comparison.log_odds(&registered);
+        if comparison.may_take(&registered) && log_odds > least_nats {
             let fitting = registered.iter().flatten().count();
-            let log_odds: f64 = comparison.evidence(&registered).iter().sum();
             found.push((log_odds, fitting, reading));
         }
     }
@@ -145,8 +136,8 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
     }))
 }
 
-/// Deviations of the second frames from their prior, `½ eᵀΣ⁻¹e`; None where a frame does not fit.
-type Registrations = Vec<Option<f64>>;
+/// The second frames of the pairs; None where a frame does not fit.
+type Registrations = Vec<Option<Registered>>;
 
 /// The reading given, with which others are compared.
 struct Comparison {
@@ -157,32 +148,38 @@ struct Comparison {
 }
 
 impl Comparison {
-    /// Evidence of the first pairs for a reading against the one given, nats. A frame that does not
-    /// fit deviates by as much as the prior allows.
-    fn evidence(&self, reading: &[Option<f64>]) -> Vec<f64> {
-        let deviation = |registered: &Option<f64>| registered.unwrap_or(MAX_DEVIATION_COST);
+    /// Evidence of the first pairs for a reading against the one given by their priors, nats.
+    fn evidence<'a>(&'a self, reading: &'a [Option<Registered>]) -> impl Iterator<Item = f64> + 'a {
         let pairs = reading.iter().zip(&self.of_given);
-        pairs
-            .map(|(reading, given)| deviation(given) - deviation(reading))
-            .collect()
+        pairs.map(move |(reading, given)| deviation(given) - deviation(reading))
     }
 
-    /// True if a reading is taken whose first pairs are `reading` and in which all others fit
+    /// Logarithm of the odds of a reading to the one given, by priors and, where a pair fits in
+    /// both, by pixels.
+    fn log_odds(&self, reading: &[Option<Registered>]) -> f64 {
+        let of_pixels = |(reading, given): (&Option<Registered>, &Option<Registered>)| {
+            Some((*reading)?.log_likelihood - (*given)?.log_likelihood)
+        };
+        let of_pixels = reading.iter().zip(&self.of_given).filter_map(of_pixels);
+        self.evidence(reading).sum::<f64>() + of_pixels.sum::<f64>()
+    }
+
+    /// True if a reading may be taken whose first pairs are `reading` and in which all others fit
     /// without any deviation.
-    fn may_take(&self, reading: &[Option<f64>]) -> bool {
-        let at_best = vec![Some(0.0); self.of_given.len() - reading.len()];
-        let pairs = [reading, &at_best].concat();
-        let evidence = self.evidence(&pairs);
-        let fitting = pairs.iter().flatten().count();
+    fn may_take(&self, reading: &[Option<Registered>]) -> bool {
+        let left = &self.of_given[reading.len()..];
+        let at_best = left.iter().map(deviation);
+        let evidence: Vec<f64> = self.evidence(reading).chain(at_best).collect();
+        let fitting = reading.iter().flatten().count() + left.len();
         let for_it = evidence.iter().filter(|nats| **nats > 0.0).count();
-        evidence.iter().sum::<f64>() > self.least_nats && 4 * fitting.min(for_it) >= 3 * pairs.len()
+        let is_likely = evidence.iter().sum::<f64>() > self.least_nats;
+        is_likely && 4 * fitting.min(for_it) >= 3 * evidence.len()
     }
 }
 
-/// The first frames of the pairs: evenly distributed, no frame in two pairs.
-fn first_frames(frames: usize) -> Vec<usize> {
-    let pairs = (frames / 2).min(MAX_PAIRS);
-    (0..pairs).map(|k| k * frames / pairs.max(1)).collect()
+/// Deviation of a frame from its prior; one that does not fit deviates by as much as that allows.
+fn deviation(registered: &Option<Registered>) -> f64 {
+    registered.map_or(MAX_DEVIATION_COST, |registered| registered.deviation)
 }
 
 /// The pictures of pairs of neighbouring frames, as read.
@@ -212,7 +209,7 @@ impl Pictures {
         &self,
         survey: &Survey,
         reading: &PoseReading,
-        is_wanted: impl Fn(&[Option<f64>]) -> bool,
+        is_wanted: impl Fn(&[Option<Registered>]) -> bool,
     ) -> Result<Registrations, RefineError> {
         let turned = |picture| reading.orientation.turned(picture);
         let mut frames = FrameSet::in_memory(self.pictures.iter().map(turned));
@@ -227,6 +224,7 @@ impl Pictures {
             ..RefineOptions::fast()
         };
         let input = RefineInput {
+            camera: reading.camera(&survey.camera),
             frames: &frames,
             initial: &initial,
             pose_gaps: &[],
@@ -235,94 +233,63 @@ impl Pictures {
         let setup = Setup::new(input, &options)?;
         // No light is known yet.
         setup.frames.set_light(Light::Normalised);
-        register_pairs(&setup, is_wanted)
-    }
-}
-
-/// Registers frames 1, 3, 5 … on the wall that frames 0, 2, 4 … show, as long as `is_wanted` of
-/// those before.
-fn register_pairs(
-    setup: &Setup,
-    is_wanted: impl Fn(&[Option<f64>]) -> bool,
-) -> Result<Registrations, RefineError> {
-    let coarsest = setup.coarsest_level();
-    let prescreened = prescreen(&setup.initial_context(0.0), coarsest, &Silent)?;
-    let context = setup.initial_context(prescreened.noise);
-    let initial = setup.prior.initial.iter();
-    let states = FrameStates {
-        estimates: initial.map(|pose| FrameEstimate::at(*pose)).collect(),
-        rejections: prescreened.rejections,
-        kappa: Kappa::zeros(),
-    };
-    let footprints = footprints(&context, &states)?;
-    let register = |pair: &usize| -> Result<Option<f64>, RefineError> {
-        let frame_range = 2 * pair..2 * pair + 2;
-        if states.inliers(&frame_range).contains(&false) {
-            return Ok(None);
-        }
-        let neighbours = Neighbours {
-            estimates: &states.estimates[frame_range.clone()],
-            registered: &[true, false],
-            footprints: &footprints[frame_range.clone()],
-            frame_range,
+        let prescreened = prescreen(&setup.initial_context(0.0), setup.coarsest_level(), &Silent)?;
+        let context = setup.initial_context(prescreened.noise);
+        let initial = setup.prior.initial.iter();
+        let states = FrameStates {
+            estimates: initial.map(|pose| FrameEstimate::at(*pose)).collect(),
+            rejections: prescreened.rejections,
+            kappa: Kappa::zeros(),
         };
-        let frame = 2 * pair + 1;
-        let predicted = PosePrediction {
-            pose: states.estimates[frame].pose,
-            sigma_scale: 1.0,
-        };
-        let registered = register_frame(
-            &context,
-            setup.options,
-            frame,
-            &predicted,
-            &neighbours,
-            &mut Effort::of(MAX_PAIR_HYPOTHESES),
-        )?;
-        Ok(registered.ok().map(|registered| registered.deviation))
-    };
-    let pairs: Vec<usize> = (0..setup.count() / 2).collect();
-    let mut registered = Vec::new();
-    for batch in pairs.chunks(PAIRS_AT_ONCE) {
-        if !is_wanted(&registered) {
-            break;
-        }
-        for one in batch.par_map(register) {
-            registered.push(one?);
-        }
+        // The pictures are those of the pairs alone.
+        let firsts: Vec<usize> = (0..self.frames.len()).step_by(2).collect();
+        Ok(register_pairs(
+            &context, &options, &states, &firsts, is_wanted,
+        )?)
     }
-    Ok(registered)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tunnelstitch_geometry::trajectory::Pose;
 
-    #[test]
-    fn pairs_are_spread_and_share_no_frame() {
-        assert_eq!(first_frames(1).len(), 0);
-        assert_eq!(first_frames(5), [0, 2]);
-        let firsts = first_frames(1001);
-        assert_eq!(firsts.len(), MAX_PAIRS);
-        assert!(firsts.windows(2).all(|pair| pair[1] >= pair[0] + 2));
-        assert!(firsts.iter().all(|first| first + 1 < 1001));
-        assert!(first_frames(24).iter().all(|first| first % 2 == 0));
+    /// A frame that deviates from its prior by so much, and correlates by so much.
+    fn fits(deviation: f64, log_likelihood: f64) -> Option<Registered> {
+        Some(Registered {
+            estimate: FrameEstimate::at(Pose::identity()),
+            is_reliable: true,
+            deviation,
+            log_likelihood,
+        })
     }
 
     #[test]
     fn a_reading_is_given_up_once_the_other_pairs_cannot_save_it() {
         let comparison = Comparison {
-            of_given: vec![Some(3.0); 12],
+            of_given: vec![fits(3.0, 0.0); 12],
             least_nats: 9.5,
         };
         assert!(comparison.may_take(&[]));
-        assert!(comparison.may_take(&[Some(1.0); 12]));
+        assert!(comparison.may_take(&[fits(1.0, 0.0); 12]));
         // Three quarters of the pairs must fit, and speak for it.
-        assert!(comparison.may_take(&[Some(4.0); 3]));
-        assert!(!comparison.may_take(&[Some(4.0); 4]));
+        assert!(comparison.may_take(&[fits(4.0, 0.0); 3]));
+        assert!(!comparison.may_take(&[fits(4.0, 0.0); 4]));
         assert!(!comparison.may_take(&[None; 4]));
         // A pair that does not fit costs more than the others can make up for here.
         assert!(!comparison.may_take(&[None]));
-        assert!(!comparison.may_take(&[Some(2.5); 12]));
+        assert!(!comparison.may_take(&[fits(2.5, 0.0); 12]));
+    }
+
+    /// Steps that are longer than planned fit a shorter focal length, but the pictures do not.
+    #[test]
+    fn pixels_that_correlate_worse_speak_against_a_reading() {
+        let comparison = Comparison {
+            of_given: vec![fits(3.0, 40.0), fits(3.0, 40.0), None],
+            least_nats: 3.0,
+        };
+        let odds = |of_pixels: f64| comparison.log_odds(&[fits(1.0, of_pixels); 3]);
+        assert_eq!(odds(40.0), 4.0 + MAX_DEVIATION_COST - 1.0);
+        assert_eq!(odds(30.0), odds(40.0) - 20.0);
     }
 }

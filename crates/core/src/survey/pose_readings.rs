@@ -1,5 +1,7 @@
-//! Readings of a survey's poses and pictures that people get wrong, to be told by the pictures.
+//! Readings of a survey's poses, pictures and camera that people get wrong, to be told by the
+//! pictures.
 
+use super::calibrate::CalibrationGroup;
 use super::error::SurveyError;
 use super::open::Survey;
 use super::pose_reader::{InterpretedPoses, PoseReader};
@@ -7,6 +9,7 @@ use super::pose_validation::feasible_conventions;
 use super::poses_section::PosesSection;
 use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
+use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{Pose, PoseFormat, Trajectory};
 
@@ -16,6 +19,9 @@ const UNITS: [(&str, f64); 3] = [
     ("centimetres", 0.01),
     ("feet", 0.3048),
 ];
+
+/// Focal lengths over the given one that are tried: nearer ones are found by estimating them.
+const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
 
 /// Pictures may be stored otherwise than the camera saw them.
 const ORIENTATIONS: [(&str, PictureOrientation); 3] = [
@@ -39,6 +45,8 @@ pub struct PoseReading {
     pub initial: Trajectory,
     /// The orientation of the pictures against the one given.
     pub orientation: PictureOrientation,
+    /// The focal length over the given one.
+    pub focal_factor: f64,
 }
 
 impl PoseReading {
@@ -49,14 +57,24 @@ impl PoseReading {
             changes,
             initial,
             orientation: PictureOrientation::Stored,
+            focal_factor: 1.0,
+        }
+    }
+
+    /// The camera of the reading, `given` the one of the survey.
+    pub fn camera(&self, given: &Camera) -> Camera {
+        Camera {
+            fx: self.focal_factor * given.fx,
+            fy: self.focal_factor * given.fy,
+            ..*given
         }
     }
 }
 
 impl Survey {
     /// The initial poses as given, followed by every other reading that leaves all cameras inside:
-    /// other conventions, the reverse order, quaternions that begin with w, other units, and
-    /// pictures that are turned or mirrored.
+    /// other conventions, the reverse order, quaternions that begin with w, other units, pictures
+    /// that are turned or mirrored, and other focal lengths.
     ///
     /// # Errors
     /// The errors of [`Survey::open`], if the file has changed since.
@@ -90,7 +108,19 @@ impl Survey {
             orientation,
             ..as_given.clone()
         });
-        let others = poses.chain(pictures);
+        let estimates_focal = (self.file.calibrate.iter())
+            .any(|section| section.unknowns.contains(&CalibrationGroup::Focal));
+        let factors = FOCAL_FACTORS.into_iter().filter(|_| !estimates_focal);
+        let lenses = factors.map(|focal_factor| PoseReading {
+            remedy: format!(
+                "a focal length of about {focal_factor} times the given one (unknowns = \
+                 [\"focal\"] and focal_sigma_percent = 20 under [calibrate])"
+            ),
+            changes: 1,
+            focal_factor,
+            ..as_given.clone()
+        });
+        let others = poses.chain(pictures).chain(lenses);
         Ok(std::iter::once(as_given.clone()).chain(others).collect())
     }
 }

@@ -47,6 +47,8 @@ pub const INTRINSIC_PARAMETERS: usize = 5;
 const DISTORTION_INDICES: std::ops::Range<usize> = 3..5;
 /// Number of datum parameters ([`Datum`]); they follow the intrinsics in κ.
 pub const DATUM_PARAMETERS: usize = 5;
+/// Index of `ln f` in κ.
+pub const FOCAL_INDEX: usize = 0;
 /// Index of `ln r` in κ.
 pub const RADIUS_INDEX: usize = 5;
 /// Index of the readout time ρ in κ, seconds.
@@ -184,8 +186,8 @@ impl Calibration {
     /// The camera at κ; None if its distortion is not invertible over the image.
     pub fn camera(&self, kappa: &Kappa) -> Option<Camera> {
         let mut camera = self.given;
-        camera.fx *= kappa[0].exp();
-        camera.fy *= kappa[0].exp();
+        camera.fx *= kappa[FOCAL_INDEX].exp();
+        camera.fy *= kappa[FOCAL_INDEX].exp();
         camera.cx += kappa[1];
         camera.cy += kappa[2];
         let [k1, k2] = camera.lens.k1_k2();

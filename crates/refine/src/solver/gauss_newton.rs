@@ -75,6 +75,7 @@ pub struct SolveState {
     pub iterations: u64,
     lambda: f64,
     length: f64,
+    decrement: Option<f64>,
     cost_start: f64,
     steps: Vec<StepRecord>,
 }
@@ -103,6 +104,8 @@ pub struct DampedGaussNewton {
     lambda: f64,
     /// Length of the next undamped step, in Gauss–Newton steps.
     length: f64,
+    /// Decrement `δᵀHδ` of the step before, if it was undamped and no frame was held.
+    decrement: Option<f64>,
     /// Cost and equations at the present unknowns; None before the first linearisation.
     current: Option<Linearisation>,
     /// The unknowns at which `current` is.
@@ -119,6 +122,7 @@ impl DampedGaussNewton {
             stopping,
             lambda: 0.0,
             length: 1.0,
+            decrement: None,
             current: None,
             linearised_at: Unknowns::default(),
             cost_start: None,
@@ -132,6 +136,7 @@ impl DampedGaussNewton {
         Self {
             lambda: state.lambda,
             length: state.length,
+            decrement: state.decrement,
             cost_start: Some(state.cost_start),
             steps: state.steps.clone(),
             ..Self::new(stopping)
@@ -145,6 +150,7 @@ impl DampedGaussNewton {
             iterations,
             lambda: self.lambda,
             length: self.length,
+            decrement: self.decrement,
             cost_start: self.cost_start.unwrap_or_default(),
             steps: self.steps.clone(),
         }
@@ -264,6 +270,7 @@ impl DampedGaussNewton {
                 let curvature = |before: f64, after: f64| (1.0 - after / before) / length;
                 let of_poses = |at| slots_slope(&step[..frames.len()], at, 6);
                 record.curvature = is_whole.then(|| curvature(of_poses(&current), of_poses(&next)));
+                self.decrement = is_whole.then_some(decrement);
                 self.steps.push(record);
                 self.length = if is_whole && step_px < STEP_TOLERANCE_PX {
                     next_length(curvature(-decrement, left))
@@ -304,12 +311,17 @@ impl DampedGaussNewton {
     }
 
     /// The reason for which a step that moves the wall by `step_px` and lowers the quadratic model
-    /// by `½ decrement` is the last one, if it is. `unknowns` are those of the frames: the wall's
+    /// by `½ decrement` is the last one, if it is: the step itself, or, at the end of a solve, what
+    /// it leaves, is shorter than the tolerance. `unknowns` are those of the frames: the wall's
     /// shape has many more, most of which the prior determines.
     fn reason_to_stop(&self, step_px: f64, decrement: f64, unknowns: usize) -> Option<StopReason> {
-        if step_px < self.stopping.step_px {
+        let left = match step_px < STEP_TOLERANCE_PX {
+            true => share_left(self.decrement, decrement),
+            false => 1.0,
+        };
+        if left * step_px < self.stopping.step_px {
             Some(StopReason::StepBelowTolerance)
-        } else if decrement < self.stopping.step_sigma.powi(2) * unknowns as f64 {
+        } else if left.powi(2) * decrement < self.stopping.step_sigma.powi(2) * unknowns as f64 {
             Some(StopReason::StepBelowUncertainty)
         } else {
             None
@@ -338,6 +350,21 @@ impl DampedGaussNewton {
 /// Numerical Analysis 8(1), 1988.
 fn next_length(curvature: f64) -> f64 {
     curvature.clamp(MIN_CURVATURE, 1.0).recip()
+}
+
+/// The share of an undamped step that is left after it, at the most 1: steps shrink by
+/// `ρ = √(decrement/before)` from one to the next, so that those to come add up to `ρ/(1 − ρ)` of
+/// it. `before`: the decrement of the step before, if that was undamped, too.
+///
+/// Source: J. Nocedal and S. J. Wright, "Numerical Optimization", 2006, chapter 10 (Gauss–Newton
+/// converges linearly where residuals are left).
+fn share_left(before: Option<f64>, decrement: f64) -> f64 {
+    let ratio = before.map_or(1.0, |before| (decrement / before).sqrt());
+    if ratio < 0.5 {
+        ratio / (1.0 - ratio)
+    } else {
+        1.0
+    }
 }
 
 /// Sets the steps of frames to zero that would become infeasible: one frame that fits nowhere must
@@ -375,6 +402,15 @@ fn slope(step: &[FrameStep], shared: &Kappa, at: &Linearisation) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Steps that shrink to a tenth leave a ninth; those that hardly shrink, or follow none, are
+    /// taken to leave as much as they are.
+    #[test]
+    fn a_step_leaves_the_sum_of_those_to_come() {
+        assert!((share_left(Some(100.0), 1.0) - 1.0 / 9.0).abs() < 1e-12);
+        assert_eq!(share_left(Some(1.0), 0.8), 1.0);
+        assert_eq!(share_left(None, 1.0), 1.0);
+    }
 
     /// With half of the predicted curvature a step goes half of the way: the next one twice as far,
     /// and no farther. With more than that the step stays whole.

@@ -8,6 +8,7 @@ use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::{Estimation, PipelineState};
 use crate::tracking::alternating_calibration::AlternatingCalibration;
+use crate::tracking::focal_search::search_focal_length;
 
 /// Runs the stage; a snapshot may be kept after every frame.
 ///
@@ -24,11 +25,17 @@ pub fn run<'a>(
         prior: &setup.tracking_prior,
         ..initial.clone()
     };
-    let tracking = state.tracking.take();
-    let tracking =
-        tracking.unwrap_or_else(|| AlternatingCalibration::new(state.frames.rejections.clone()));
-    let stopping = Stopping::intermediate(setup.options, setup.handover_level());
     let progress = session.progress.clone();
+    let tracking = match state.tracking.take() {
+        Some(tracking) => tracking,
+        None => {
+            let rejections = state.frames.rejections.clone();
+            let (options, progress) = (setup.options, progress.as_ref());
+            let kappa = search_focal_length(&context, options, &rejections, progress)?;
+            AlternatingCalibration::new(rejections, kappa)
+        }
+    };
+    let stopping = Stopping::intermediate(setup.options, setup.handover_level());
     let keep = |tracking: &AlternatingCalibration| {
         session.keep_if_due(setup, || PipelineState {
             tracking: Some(tracking.clone()),

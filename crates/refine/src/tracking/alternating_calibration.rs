@@ -45,9 +45,9 @@ pub struct AlternatingCalibration {
 }
 
 impl AlternatingCalibration {
-    /// Tracking that has not begun; `rejections`: of frames that prescreening has rejected.
-    pub fn new(rejections: Vec<Option<RejectionReason>>) -> Self {
-        let kappa = Kappa::zeros();
+    /// Tracking that has not begun, with the shared parameters `kappa`; `rejections`: of frames that
+    /// prescreening has rejected.
+    pub fn new(rejections: Vec<Option<RejectionReason>>, kappa: Kappa) -> Self {
         Self {
             round: 0,
             kappa,

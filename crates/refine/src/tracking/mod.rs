@@ -9,7 +9,8 @@
 //! Tracking registers one frame after another: the prior predicts a pose, the correlation search
 //! compares the unwrapped frame with a reference mosaic of its neighbours, and the hypotheses are
 //! refined and chosen from. Sliding windows keep the error bounded. While shading or camera are
-//! only roughly known, tracking alternates with their calibration. [`lamp_search`] finds a lamp
+//! only roughly known, tracking alternates with their calibration. A focal length that is hardly known
+//! is searched for before, by pairs of neighbours ([`focal_search`]). [`lamp_search`] finds a lamp
 //! once poses are good.
 
 pub mod alternating_calibration;
@@ -17,10 +18,12 @@ pub mod candidate;
 pub mod correlation_search;
 pub mod correlator;
 pub mod first_light;
+pub mod focal_search;
 pub mod lamp_search;
 pub mod light_model;
 pub mod mosaic_grid;
 pub mod ncc_score;
+pub mod neighbour_pairs;
 pub mod neighbours;
 pub mod pose_prediction;
 pub mod pose_separation;

@@ -52,6 +52,8 @@ pub struct Registered {
     pub is_reliable: bool,
     /// Deviation from the prior's prediction, `½ eᵀΣ⁻¹e`.
     pub deviation: f64,
+    /// Log-likelihood of its correlation with the wall, nats; 0 where there is none.
+    pub log_likelihood: f64,
 }
 
 /// The effort that registering frames may take: hypotheses that are refined.
@@ -262,6 +264,7 @@ impl<'r> Registration<'r> {
             estimate,
             is_reliable: candidate.is_reliable(),
             deviation: candidate.deviation,
+            log_likelihood: candidate.log_likelihood,
         })
     }
 

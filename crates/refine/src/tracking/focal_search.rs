@@ -1,0 +1,76 @@
+//! Search for a focal length that is hardly known.
+//!
+//! Tracking and Gauss–Newton correct a focal length that is wrong by a few per cent. Where its prior
+//! is wider, focal lengths are tried over the whole of it: with each, the second frames of some
+//! pairs of neighbours are registered on the wall that the first ones show. A wrong focal length
+//! turns them by too much or too little against the prior of the poses, and bends what they show, so
+//! that it correlates less. The log-posterior of κ₀ = ln f is the sum over the pairs of
+//! log-likelihood and prior.
+
+use crate::model::context::EstimationContext;
+use crate::model::frame_states::FrameStates;
+use crate::model::problem_error::ProblemError;
+use crate::model::rejection::RejectionReason;
+use crate::options::RefineOptions;
+use crate::parameters::calibration::{FOCAL_INDEX, Kappa};
+use crate::parameters::frame_estimate::FrameEstimate;
+use crate::tracking::neighbour_pairs::{first_frames, register_pairs};
+use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
+use tunnelstitch_core::progress::Progress;
+
+/// Distance between the logarithms of neighbouring focal lengths: half of it moves the border of a
+/// picture by a pixel or two of the level at which frames are searched for.
+const STEP: f64 = 0.04;
+/// Reach of the search, 1-σ of the prior.
+const REACH_SIGMAS: f64 = 2.0;
+
+/// Shared parameters with which tracking begins: zero but for the logarithm of the focal length over
+/// the given one, if it is asked for and its prior reaches farther than tracking does by itself.
+/// `rejections`: of frames that show nothing.
+///
+/// # Errors
+/// [`ProblemError`]: a frame that cannot be read.
+pub fn search_focal_length(
+    context: &EstimationContext,
+    options: &RefineOptions,
+    rejections: &[Option<RejectionReason>],
+    progress: &dyn Progress,
+) -> Result<Kappa, ProblemError> {
+    let calibration = &context.calibration;
+    let sigma = calibration.sigma[FOCAL_INDEX];
+    let reach = (REACH_SIGMAS * sigma / STEP) as i32;
+    if reach == 0 || !calibration.free[FOCAL_INDEX] {
+        return Ok(Kappa::zeros());
+    }
+    let initial = context.prior.initial.iter();
+    let states = FrameStates {
+        estimates: initial.map(|pose| FrameEstimate::at(*pose)).collect(),
+        rejections: rejections.to_vec(),
+        kappa: Kappa::zeros(),
+    };
+    let firsts = first_frames(states.estimates.len());
+    progress.start("focal length", 2 * reach as usize + 1);
+    let (mut best, mut found) = (f64::NEG_INFINITY, Kappa::zeros());
+    for k in -reach..=reach {
+        let mut kappa = Kappa::zeros();
+        kappa[FOCAL_INDEX] = STEP * f64::from(k);
+        let context = context.at(kappa);
+        let pairs = register_pairs(&context, options, &states, &firsts, |_| true)?;
+        let of_pairs: f64 = pairs.iter().map(log_posterior).sum();
+        let score = of_pairs - 0.5 * (kappa[FOCAL_INDEX] / sigma).powi(2);
+        if score > best {
+            (best, found) = (score, kappa);
+        }
+        progress.advance(1);
+    }
+    progress.finish();
+    Ok(found)
+}
+
+/// Log-posterior of the second frame of a pair; one that does not fit deviates by as much as the
+/// prior allows, and correlates with nothing.
+fn log_posterior(registered: &Option<Registered>) -> f64 {
+    registered.map_or(-MAX_DEVIATION_COST, |registered| {
+        registered.log_likelihood - registered.deviation
+    })
+}
