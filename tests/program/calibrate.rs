@@ -74,6 +74,37 @@ fn a_wrong_focal_length_is_found_and_the_result_is_a_survey() {
     succeed(&[&arguments[..], &more, &["--px-per-metre", "40"]].concat());
 }
 
+/// Pictures and poses without a calibration: `init` guesses a camera, `refine` finds its focal length
+/// and distortion. With a calibration that is as wrong, `check` names the line that asks for that.
+#[test]
+fn a_survey_without_calibration_is_refined() {
+    let dir = tempfile::tempdir().unwrap();
+    let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
+    let options = ["--frames", "24", "--size", "240x180", "--k1", "-0.1"];
+    simulate(&survey, &options);
+    let truth = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
+    scale_focal(&survey, 1.3);
+    let said = tunnelstitch(&["check", text(&survey)]).stderr;
+    let said = String::from_utf8_lossy(&said);
+    let remedy = "focal length of about 0.79 times the given one (unknowns = [\"focal\"]";
+    assert!(said.contains(remedy), "{said}");
+
+    for name in ["survey.toml", "camera.json"] {
+        std::fs::remove_file(survey.join(name)).unwrap();
+    }
+    let said = succeed(&["init", text(&survey), "--radius-m", "3"]);
+    assert!(said.contains("a pinhole is guessed"), "{said}");
+    succeed(&["refine", text(&survey), "--out", text(&out), "--quiet"]);
+    let unknown = reported_unknowns(&out);
+    for (name, truth) in [("focal", truth.fx), ("k1", -0.1)] {
+        assert_eq!(unknown(name)["observed"], true, "{}", unknown(name));
+        assert_honest(&unknown(name), truth);
+    }
+    let frames = json(&out.join("refine.json"))["frames"].clone();
+    let mut frames = frames.as_array().unwrap().iter();
+    assert!(frames.all(|frame| frame["flag"] == "photometric"));
+}
+
 /// Everything wrong at once: observable parameters are right, the others have a reason.
 #[test]
 fn everything_wrong_at_once_is_found_or_refused() {

@@ -189,10 +189,8 @@ fn write_text_files(
             ..options.tunnel.clone()
         },
         camera: CameraSection {
-            file: "camera.json".into(),
-            name: None,
             readout_ms: (options.readout_ms != 0.0).then_some(options.readout_ms),
-            max_range_m: None,
+            ..CameraSection::of_file("camera.json")
         },
         frames: FramesSection {
             images: Some(format!("frames/*.{}", frame_format(options).1)),

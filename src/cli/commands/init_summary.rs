@@ -105,8 +105,12 @@ fn mask(found: &Discovery) -> Option<String> {
     mask.map(|mask| row("mask", printed(mask).to_string()))
 }
 
-/// The calibration, then others.
+/// The calibration, then others; or that there is none.
 fn calibrations(found: &Discovery) -> Vec<String> {
+    if found.calibrations.is_empty() {
+        let text = "none: a pinhole is guessed, and refine searches for its focal length";
+        return vec![row("calibration", text.to_owned())];
+    }
     let size = |k: usize| found.calibrations.get(k).map(|(_, c)| (c.width, c.height));
     let line = |(k, (path, camera)): (usize, &(PathBuf, Camera))| {
         let (width, height) = (camera.width, camera.height);

@@ -28,7 +28,8 @@ impl Survey {
             if file.tunnel.is_straight_and_round() {
                 file.tunnel.radius_m = Some(radius_m);
             }
-            file.camera.file = camera_file.into();
+            file.camera.file = Some(camera_file.into());
+            file.camera.horizontal_fov_deg = None;
             file.camera.name = None;
         }
         file.tunnel.shape_file = found.shape_file.map(Into::into);

@@ -1,6 +1,7 @@
 //! The content of `survey.toml`.
 
 use super::calibrate::CalibrateSection;
+use super::camera_section::CameraSection;
 use super::error::SurveyError;
 use super::poses_section::PosesSection;
 use super::tunnel::TunnelSection;
@@ -47,7 +48,7 @@ impl SurveyFile {
             self.tunnel.centreline.as_mut(),
             self.tunnel.shape_file.as_mut(),
             self.tunnel.points.as_mut(),
-            Some(&mut self.camera.file),
+            self.camera.file.as_mut(),
             self.frames.times.as_mut(),
             self.frames.mask.as_mut(),
             Some(&mut poses.initial),
@@ -58,25 +59,6 @@ impl SurveyFile {
         .into_iter()
         .flatten()
     }
-}
-
-/// `[camera]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CameraSection {
-    /// Calibration file.
-    pub file: PathBuf,
-    /// Name of the camera, if the file has several.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds of
-    /// the poses' times; negative if rows are read bottom-up. Time and pose of a frame are those of
-    /// its middle row. Without it, all rows are read at once.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub readout_ms: Option<f64>,
-    /// Distance from the camera up to which the wall is used, metres; six radii by default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub max_range_m: Option<f64>,
 }
 
 /// `[frames]`.
@@ -227,8 +209,9 @@ mod tests {
                 }],
             },
             camera: CameraSection {
-                file: "camera.json".into(),
+                file: Some("camera.json".into()),
                 name: None,
+                horizontal_fov_deg: None,
                 readout_ms: Some(-20.0),
                 max_range_m: Some(9.0),
             },

@@ -18,7 +18,7 @@ use super::{ignore, pose_validation};
 use crate::frames::{FrameSet, Mask, Video};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tunnelstitch_geometry::camera::{Camera, read_calibration_of};
+use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::surface::{
     Bend, RadialField, Surface, WallRegions, bent, displaced, with_range,
@@ -128,17 +128,8 @@ impl Survey {
         let surface = displaced(&nominal, displacement.clone());
         check_values(&file).map_err(value)?;
         let picture_size = || FrameList::first_size(&file.frames, &toml_path, &folder);
-        let calibration = folder.join(&file.camera.file);
-        let camera_name = file.camera.name.as_deref();
-        let calibrated = read_calibration_of(&calibration, camera_name, &picture_size)?;
-        let max_range_m = file.camera.max_range_m.unwrap_or(calibrated.max_range_m);
-        let camera = with_range(
-            &Camera {
-                max_range_m,
-                ..calibrated
-            },
-            surface.as_ref(),
-        );
+        let camera = file.camera.camera(&toml_path, &folder, &picture_size)?;
+        let camera = with_range(&camera, surface.as_ref());
         let listed = FrameList::new(&file.frames, &toml_path, &folder, None)?;
         let size = (camera.width, camera.height);
         let (listed, orientation_warning) = listed.oriented(size, &file.frames);

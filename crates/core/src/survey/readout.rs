@@ -1,6 +1,6 @@
 //! The readout time of a rolling shutter that the calibration states.
 
-use super::file::CameraSection;
+use super::camera_section::CameraSection;
 use std::path::Path;
 use tunnelstitch_geometry::camera::stated_readout_ms;
 use tunnelstitch_geometry::files::printed;
@@ -10,7 +10,7 @@ pub(super) fn readout_warning(section: &CameraSection, folder: &Path) -> Option<
     if section.readout_ms.is_some() {
         return None;
     }
-    let path = folder.join(&section.file);
+    let path = folder.join(section.file.as_ref()?);
     let readout_ms = stated_readout_ms(&path)?;
     Some(format!(
         "{}: states a rolling shutter; put readout_ms = {readout_ms} under [camera], or 0 if the \
@@ -28,12 +28,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let profile = r#"{"fisheye_params": {}, "calib_dimension": {}, "frame_readout_time": 8.5}"#;
         std::fs::write(dir.path().join("lens.json"), profile).unwrap();
-        let mut section = CameraSection {
-            file: "lens.json".into(),
-            name: None,
-            readout_ms: None,
-            max_range_m: None,
-        };
+        let mut section = CameraSection::of_file("lens.json");
         let warning = readout_warning(&section, dir.path()).unwrap();
         assert!(warning.contains("readout_ms = 8.5 under"), "{warning}");
         section.readout_ms = Some(0.0);

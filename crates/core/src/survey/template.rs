@@ -20,6 +20,18 @@ rotation_sigma_deg = 2.0    # about each axis
 translation_sigma_m = [0.02, 0.02, 0.03]
 ";
 
+/// Horizontal field of view of a camera of which nothing is known, degrees: between the 45° of
+/// telephones and the 90° of inspection cameras.
+const GUESSED_FOV_DEG: f64 = 65.0;
+
+/// The table `[calibrate]` for a camera without calibration.
+const GUESSED_CAMERA: &str = "
+[calibrate]                 # of a guessed camera; take it away once there is a calibration
+unknowns = [\"focal\", \"distortion\"]
+focal_sigma_percent = 30.0  # of the guess, 1-σ
+k1_sigma = 0.1
+";
+
 impl Discovery {
     /// The text of a `survey.toml` for what was found, with comments; without `radius_m` it has a
     /// line to be filled in.
@@ -55,7 +67,9 @@ impl Discovery {
                  cameras.bin, nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, \
                  Meshroom, Metashape, Bundler, RealityCapture or Pix4D, a lens profile of \
                  Gyroflow, a recording with CameraInfo, or our camera.json.\n\
-                 file = \"camera.json\""
+                 # file = \"camera.json\"\n\
+                 # Without one, a pinhole; refine searches for its focal length.\n\
+                 horizontal_fov_deg = {GUESSED_FOV_DEG:?}    # across the frames: a guess"
             ),
         };
         self.write_frames(&mut text);
@@ -68,6 +82,9 @@ impl Discovery {
         text += CONVENTIONS;
         self.write_world(&mut text);
         text += PRIOR;
+        if self.calibrations.is_empty() {
+            text += GUESSED_CAMERA;
+        }
         text
     }
 

@@ -69,9 +69,26 @@ impl Camera {
     /// A pinhole camera with square pixels and a central principal point, from its vertical field
     /// of view (radians): `f = (height / 2) / tan(fov / 2)`.
     pub fn from_vertical_fov(width: u32, height: u32, fov_rad: f64) -> Self {
-        let f = 0.5 * f64::from(height) / (0.5 * fov_rad).tan();
-        let [cx, cy] = [width, height].map(|pixels| 0.5 * (f64::from(pixels) - 1.0));
-        Self::at_rest([width, height], [f, f], [cx, cy], Lens::default())
+        Self::central_pinhole(
+            [width, height],
+            0.5 * f64::from(height) / (0.5 * fov_rad).tan(),
+        )
+    }
+
+    /// A pinhole camera with square pixels and a central principal point, from its horizontal field
+    /// of view (radians): `f = (width / 2) / tan(fov / 2)`.
+    pub fn from_horizontal_fov(width: u32, height: u32, fov_rad: f64) -> Self {
+        Self::central_pinhole(
+            [width, height],
+            0.5 * f64::from(width) / (0.5 * fov_rad).tan(),
+        )
+    }
+
+    /// A pinhole camera with square pixels, a focal length of `f` pixels and a central principal
+    /// point.
+    fn central_pinhole(size: [u32; 2], f: f64) -> Self {
+        let [cx, cy] = size.map(|pixels| 0.5 * (f64::from(pixels) - 1.0));
+        Self::at_rest(size, [f, f], [cx, cy], Lens::default())
     }
 
     /// This camera with a rolling-shutter motion.

@@ -34,7 +34,7 @@ pub fn run(data: &[u8]) {
     let (_folder, camera) = file("camera.json", format_calibration(&survey.camera).as_bytes());
     let opened = Survey::open_with(small_survey(), |file| {
         file.poses.initial = initial.clone();
-        file.camera.file = camera.clone();
+        file.camera.file = Some(camera.clone());
     });
     let Ok(survey) = opened else {
         return;
