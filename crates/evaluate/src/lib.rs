@@ -59,7 +59,7 @@ pub use error::EvaluateError;
 pub use error_statistics::ErrorStatistics;
 pub use image_metrics::{ImageMetrics, image_metrics};
 pub use mtf::mtf50;
-pub use normalised_errors::{gauge_fixed_errors, normalised_errors_squared};
+pub use normalised_errors::{first_pose_gauge, gauge_fixed_errors, normalised_errors_squared};
 pub use seam_residual::{SeamMap, SeamResidual, seam_residual};
 pub use survey::{compare_survey, plan_survey_comparison};
 pub use trajectory_error::{TrajectoryError, trajectory_error};

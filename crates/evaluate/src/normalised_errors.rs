@@ -3,7 +3,7 @@
 use crate::error::EvaluateError;
 use crate::error::check_pairs;
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
-use tunnelstitch_geometry::surface::Surface;
+use tunnelstitch_geometry::surface::{GaugeMotion, Surface};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// Computes pose errors with the gauge fixed at the first pose.
@@ -19,6 +19,23 @@ pub fn gauge_fixed_errors(
     estimated: &[Pose],
     truth: &[Pose],
 ) -> Result<Vec<Vector6<f64>>, EvaluateError> {
+    let motion = first_pose_gauge(surface, estimated, truth)?;
+    let pairs = estimated.iter().zip(truth);
+    Ok(pairs
+        .map(|(estimate, truth)| motion.apply(estimate).local(truth))
+        .collect())
+}
+
+/// The motion along the gauge after which the error of the first estimated pose has no component
+/// along it.
+///
+/// # Errors
+/// [`EvaluateError::Count`], [`EvaluateError::Empty`].
+pub fn first_pose_gauge(
+    surface: &dyn Surface,
+    estimated: &[Pose],
+    truth: &[Pose],
+) -> Result<GaugeMotion, EvaluateError> {
     check_pairs(estimated.len(), truth.len())?;
     let gauge = surface.gauge();
     let mut motion = gauge.align(&estimated[..1], &truth[..1]);
@@ -44,10 +61,7 @@ pub fn gauge_fixed_errors(
         let step = inverse * Vector2::new(turn.dot(&error), shift.dot(&error));
         motion = motion.plus(1.0, &gauge.motion(step.x, step.y));
     }
-    let pairs = estimated.iter().zip(truth);
-    Ok(pairs
-        .map(|(estimate, truth)| motion.apply(estimate).local(truth))
-        .collect())
+    Ok(motion)
 }
 
 /// Maximum Newton iterations for the gauge motion; each squares the error.
@@ -76,7 +90,7 @@ pub fn normalised_errors_squared(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_geometry::surface::{Circle, GaugeMotion};
+    use tunnelstitch_geometry::surface::Circle;
     use tunnelstitch_geometry::trajectory::spiral;
 
     #[test]

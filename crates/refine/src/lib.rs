@@ -86,6 +86,7 @@ pub use error::RefineError;
 pub use input::{RefineInput, is_motionless};
 pub use model::problem_error::ProblemError;
 pub use options::{Photometry, RefineOptions, ShapeMode};
+pub use parameters::wall_prior::WallPrior;
 pub use pipeline::{check_input, refine, refine_with_checkpoint};
 pub use point_fit::points_report::{PointsAxis, PointsReport, PointsSection};
 pub use points::error::PointsFitError;

@@ -1,12 +1,12 @@
 //! Arguments of a simulated wall as built, and of cables and lamps before it.
 
+use crate::evaluate::converge::WallDeformation;
 use crate::simulate::{AsBuilt, Fittings, Segments, SimulateOptions};
 use std::path::PathBuf;
 
-/// Deviation of the wall from the tunnel, and what is before it; the survey knows of neither.
+/// Random deformation of the lining.
 #[derive(Debug, clap::Args)]
-#[command(next_help_heading = "The wall as built (as drawn by default)")]
-pub struct AsBuiltArguments {
+pub struct DeformationArguments {
     /// Oval lining: the radius varies by ± this around the section, twice once around, along all of
     /// the tunnel, which the survey does not know. Straight round tunnels only.
     #[arg(long, value_name = "MM", default_value_t = 0.0)]
@@ -18,6 +18,25 @@ pub struct AsBuiltArguments {
     /// Length of the undulation: the distance at which its correlation has fallen to 0.6.
     #[arg(long, value_name = "M", default_value_t = 0.5)]
     undulation_length_m: f64,
+}
+
+impl DeformationArguments {
+    /// The deformation for the library.
+    pub fn deformation(&self) -> WallDeformation {
+        WallDeformation {
+            ovality_mm: self.ovality_mm,
+            undulation_mm: self.undulation_mm,
+            undulation_length_m: self.undulation_length_m,
+        }
+    }
+}
+
+/// Deviation of the wall from the tunnel, and what is before it; the survey knows of neither.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "The wall as built (as drawn by default)")]
+pub struct AsBuiltArguments {
+    #[command(flatten)]
+    deformation: DeformationArguments,
     /// Lining of rings of N segments, every other ring turned by half a segment. Straight round
     /// tunnels only.
     #[arg(long, value_name = "N")]
@@ -53,9 +72,9 @@ impl AsBuiltArguments {
     pub fn add_to(&self, options: SimulateOptions) -> SimulateOptions {
         SimulateOptions {
             as_built: AsBuilt {
-                ovality_mm: self.ovality_mm,
-                undulation_mm: self.undulation_mm,
-                undulation_length_m: self.undulation_length_m,
+                ovality_mm: self.deformation.ovality_mm,
+                undulation_mm: self.deformation.undulation_mm,
+                undulation_length_m: self.deformation.undulation_length_m,
                 segments: self.segments.map(|count| Segments {
                     count,
                     ring_length_m: self.ring_length_m,

@@ -28,7 +28,7 @@ mod simulation;
 mod textures;
 mod tunnel;
 
-pub use as_built::AsBuiltArguments;
+pub use as_built::{AsBuiltArguments, DeformationArguments};
 pub use frame_times::{FrameTimesArguments, clock_times};
 pub use imaging::ImagingArguments;
 pub use motion::{MotionArguments, MountingArguments};

@@ -1,6 +1,6 @@
 //! `tunnelstitch converge`: measures the basin of convergence on simulated surveys.
 
-use crate::cli::arguments::{JitterArgument, WallArgument, picture_size};
+use crate::cli::arguments::{DeformationArguments, JitterArgument, WallArgument, picture_size};
 use crate::cli::output::{DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::converge::{self, ConvergeOptions, SweepWall, TranslationScale};
 use crate::files::printed;
@@ -36,10 +36,14 @@ use std::path::PathBuf;
     overlap against texture\n  \
     tunnelstitch converge --efficiency --wall brick,concrete --frames 60 --seeds 10 \
     --out limit\n      \
-    efficiency against the Cramér–Rao bound, and consistency of the stated uncertainty")]
+    efficiency against the Cramér–Rao bound, and consistency of the stated uncertainty\n  \
+    tunnelstitch converge --efficiency --ovality-mm 5 --undulation-mm 3 --frames 48 --size 320x240 \
+    --seeds 20 --out walls\n      \
+    the same where the wall is deformed and unknown, and of its deformation")]
 pub struct ConvergeArguments {
     /// Compare the errors with the Cramér–Rao bound and with the stated covariances instead. The
-    /// bound is computed for a known wall texture, and for an unknown one of known spectrum.
+    /// bound is computed for a known wall texture, and for an unknown one of known spectrum; with a
+    /// deformed wall, for a wall whose deformation is unknown, whose errors are compared, too.
     /// Defaults: random walk of 2°. Writes efficiency.json and efficiency.txt.
     #[arg(long)]
     efficiency: bool,
@@ -106,8 +110,10 @@ pub struct ConvergeArguments {
     /// 1-σ of the sensor's noise, grey levels.
     #[arg(long, value_name = "GREY", default_value_t = ConvergeOptions::default().noise_grey)]
     noise: f64,
-    /// Delete the runs in DIR and start from the beginning: needed for other --frames, --size or
-    /// --noise, and for another version of the program.
+    #[command(flatten)]
+    deformation: DeformationArguments,
+    /// Delete the runs in DIR and start from the beginning: needed for other --frames, --size,
+    /// --noise or deformations, and for another version of the program.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -147,6 +153,7 @@ impl ConvergeArguments {
             width: self.size[0],
             height: self.size[1],
             noise_grey: self.noise,
+            deformation: self.deformation.deformation(),
         }
     }
 }

@@ -109,7 +109,7 @@ fn mask(found: &Discovery) -> Option<String> {
 fn calibrations(found: &Discovery) -> Vec<String> {
     if found.calibrations.is_empty() {
         let text = "none: a pinhole is guessed, and refine searches for its focal length";
-        return vec![row("calibration", text.to_owned())];
+        return vec![row("calibration", text)];
     }
     let size = |k: usize| found.calibrations.get(k).map(|(_, c)| (c.width, c.height));
     let line = |(k, (path, camera)): (usize, &(PathBuf, Camera))| {

@@ -1,11 +1,13 @@
 //! Efficiency of the refinement: its errors over the Cramér–Rao bound, and the consistency of its
 //! covariances.
 
+use crate::converge::deformation_errors::{DeformationErrors, errors_of};
 use crate::converge::error::ConvergeError;
 use crate::converge::feasible_survey::draw_survey;
 use crate::converge::options::ConvergeOptions;
 use crate::converge::sweep_cell::SweepCell;
-use crate::normalised_errors::{gauge_fixed_errors, normalised_errors_squared};
+use crate::deformation::NodeError;
+use crate::normalised_errors::{first_pose_gauge, gauge_fixed_errors, normalised_errors_squared};
 use nalgebra::{Matrix6, Vector6};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -21,7 +23,7 @@ use tunnelstitch_geometry::trajectory::{Pose, poses_of};
 use tunnelstitch_refine::{
     Covariances, FINER, PoseBounds, RefineOptions, UnknownTexture, pose_bounds, refine,
 };
-use tunnelstitch_simulate::{Scene, SimulateOptions};
+use tunnelstitch_simulate::{AsBuilt, Scene, SimulateOptions};
 
 /// 95 % quantile of χ² with 6 degrees of freedom.
 const CHI_SQUARE_95: f64 = 12.592;
@@ -91,7 +93,8 @@ pub struct Efficiency {
     pub surveys: usize,
     /// Errors of the refinement.
     pub error: PoseRms,
-    /// Cramér–Rao bound without the prior, with known gradients of the texture.
+    /// Cramér–Rao bound without the prior, with known gradients of the texture. This and the others
+    /// are with the wall unknown if it is deformed.
     pub bound: PoseRms,
     /// Cramér–Rao bound without the prior, with only the spectrum of the texture known.
     pub unknown_texture_bound: PoseRms,
@@ -110,6 +113,8 @@ pub struct Efficiency {
     /// Mean ratio of the covariances to those of independent noise
     /// ([`tunnelstitch_refine::RefineReport::variance_factor`]).
     pub variance_factor: f64,
+    /// Errors of the deformation; null if walls are not deformed, or none is seen.
+    pub deformation: Option<DeformationErrors>,
 }
 
 /// Accumulated mean squares of the frames.
@@ -173,7 +178,7 @@ pub fn measure_efficiency(
     for cell in &cells {
         let (mut error, mut bound) = (MeanSquares::default(), MeanSquares::default());
         let (mut unknown, mut bayesian) = (MeanSquares::default(), MeanSquares::default());
-        let (mut normalised, mut factors) = (Vec::new(), 0.0);
+        let (mut normalised, mut factors, mut nodes) = (Vec::new(), 0.0, Vec::new());
         let (mut by_bound, mut by_unknown, mut by_bayesian) = (Vec::new(), Vec::new(), Vec::new());
         let mut surveys = 0;
         for seed in 1..=options.seeds {
@@ -182,8 +187,9 @@ pub fn measure_efficiency(
                 progress.advance(1);
                 continue;
             };
-            let run = refine_survey(&survey, joint, out)?;
+            let run = refine_survey(&survey, options, joint, out)?;
             surveys += 1;
+            nodes.extend_from_slice(&run.nodes);
             factors += run.stated.variance_factor;
             normalised.extend(run.normalised(&run.stated));
             by_bound.extend(run.normalised(&run.bounds.known));
@@ -221,6 +227,7 @@ pub fn measure_efficiency(
             normalised_error: normalised.iter().sum::<f64>() / frames,
             inside_95: inside as f64 / frames,
             variance_factor: factors / surveys.max(1) as f64,
+            deformation: DeformationErrors::of(&nodes),
         });
         // After each cell, so that an interrupted test keeps the finished cells.
         write_files(&table, out)?;
@@ -257,6 +264,8 @@ struct RefinedSurvey {
     errors: Vec<Vector6<f64>>,
     bounds: PoseBounds,
     stated: Covariances,
+    /// Errors of the deformation at the nodes that are determined.
+    nodes: Vec<NodeError>,
 }
 
 impl RefinedSurvey {
@@ -268,8 +277,12 @@ impl RefinedSurvey {
 }
 
 /// Simulates and refines one survey, and computes its errors and bounds.
+///
+/// The bounds are those of a wall as drawn whose deformation is unknown: a few millimetres change no
+/// slope.
 fn refine_survey(
     options: &SimulateOptions,
+    sweep: &ConvergeOptions,
     joint: bool,
     out: &Path,
 ) -> Result<RefinedSurvey, ConvergeError> {
@@ -283,19 +296,28 @@ fn refine_survey(
         ..RefineOptions::default()
     };
     let refined = refine(&survey, &refining, &silent)?;
-    let scene = Scene::new(options)?;
-    let fine = scene.render_finer(FINER);
+    let as_drawn = Scene::new(&SimulateOptions {
+        as_built: AsBuilt::default(),
+        ..options.clone()
+    })?;
+    let fine = as_drawn.render_finer(FINER);
     let noise = (options.noise_grey.powi(2) + ROUNDING_VARIANCE).sqrt();
-    let texture = estimate_texture(&scene, noise);
+    let texture = estimate_texture(&as_drawn, noise);
     let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
-    let errors = gauge_fixed_errors(
-        survey.surface.as_ref(),
-        &poses_of(&refined.trajectory),
-        &truth,
-    )?;
+    let poses = poses_of(&refined.trajectory);
+    let errors = gauge_fixed_errors(survey.surface.as_ref(), &poses, &truth)?;
+    let nodes = match &refined.shape {
+        Some(shape) if sweep.deformation.is_any() => {
+            let gauge = first_pose_gauge(survey.surface.as_ref(), &poses, &truth)?;
+            errors_of(shape, &survey, &Scene::new(options)?, &gauge)
+        }
+        _ => Vec::new(),
+    };
+    let wall = sweep.deformation.prior();
     Ok(RefinedSurvey {
-        bounds: pose_bounds(&survey, &fine, noise, &texture)?,
+        bounds: pose_bounds(&survey, &fine, noise, &texture, &wall)?,
         stated: refined.covariances,
+        nodes,
         truth,
         errors,
         survey,
@@ -347,6 +369,10 @@ impl fmt::Display for Efficiency {
             self.normalised_error,
             100.0 * self.inside_95,
             self.variance_factor
-        )
+        )?;
+        match &self.deformation {
+            Some(deformation) => write!(f, "\n{deformation}"),
+            None => Ok(()),
+        }
     }
 }

@@ -22,6 +22,7 @@
 //! takes the shift under which the most frames are good, so that lost frames are counted one by
 //! one. If all frames are good, the two agree.
 
+mod deformation_errors;
 mod efficiency;
 mod error;
 mod feasible_survey;
@@ -34,7 +35,9 @@ mod summary;
 mod summary_table;
 mod sweep;
 mod sweep_cell;
+mod wall_deformation;
 
+pub use deformation_errors::DeformationErrors;
 pub use efficiency::{Efficiency, ErrorRatio, PoseRms, measure_efficiency, plan_efficiency};
 pub use error::ConvergeError;
 pub use majority_error::{GOOD_PX, MajorityError, majority_error};
@@ -43,3 +46,4 @@ pub use run_record::{RunRecord, SCHEMA_VERSION, Settings};
 pub use summary::{CellSummary, Convergence};
 pub use sweep::{SweepOutcome, SweepPlan, plan_sweep, run_sweep};
 pub use sweep_cell::{SweepCell, SweepWall};
+pub use wall_deformation::WallDeformation;

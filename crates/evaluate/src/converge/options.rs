@@ -4,6 +4,7 @@ use crate::converge::error::ConvergeError;
 use crate::converge::run_record::{SCHEMA_VERSION, Settings};
 use crate::converge::sweep_cell::unit_sigmas;
 use crate::converge::sweep_cell::{SweepCell, SweepWall};
+use crate::converge::wall_deformation::WallDeformation;
 use serde::Serialize;
 use std::collections::HashSet;
 use tunnelstitch_geometry::camera::Camera;
@@ -49,6 +50,8 @@ pub struct ConvergeOptions {
     pub height: u32,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise_grey: f64,
+    /// Deformation of the wall.
+    pub deformation: WallDeformation,
 }
 
 impl Default for ConvergeOptions {
@@ -65,6 +68,7 @@ impl Default for ConvergeOptions {
             width: 640,
             height: 480,
             noise_grey: 2.0,
+            deformation: WallDeformation::default(),
         }
     }
 }
@@ -115,6 +119,7 @@ impl ConvergeOptions {
             width: self.width,
             height: self.height,
             noise_grey: self.noise_grey,
+            deformation: self.deformation,
         }
     }
 
@@ -127,6 +132,7 @@ impl ConvergeOptions {
             jitter: Some(cell.prior()),
             wall: cell.wall.into(),
             noise_grey: self.noise_grey,
+            as_built: self.deformation.as_built(),
             seed,
             ..SimulateOptions::free()
         }

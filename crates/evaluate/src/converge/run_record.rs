@@ -1,6 +1,7 @@
 //! Record of one run, a line of runs.jsonl.
 
 use crate::converge::sweep_cell::SweepCell;
+use crate::converge::wall_deformation::WallDeformation;
 use serde::{Deserialize, Serialize};
 
 /// Version of the content of runs.jsonl and converge.json.
@@ -23,6 +24,9 @@ pub struct Settings {
     pub height: u32,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise_grey: f64,
+    /// Deformation of the wall; none in older logs.
+    #[serde(default)]
+    pub deformation: WallDeformation,
 }
 
 impl Settings {
@@ -43,6 +47,10 @@ impl Settings {
         .or_else(|| differ("frames", self.frames.to_string(), other.frames.to_string()))
         .or_else(|| differ("size", size(self), size(other)))
         .or_else(|| differ("noise", noise(self), noise(other)))
+        .or_else(|| {
+            let deformation = |settings: &Self| settings.deformation.to_string();
+            differ("the deformation", deformation(self), deformation(other))
+        })
     }
 }
 

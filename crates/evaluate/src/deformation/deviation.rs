@@ -62,7 +62,7 @@ fn without_circle(at: &Functional, fit: &CircleFit, angle_rad: f64) -> Functiona
 }
 
 /// The nodes of a row.
-fn nodes(field: &RadialField, row: i64) -> Vec<WallPoint> {
+pub(super) fn nodes(field: &RadialField, row: i64) -> Vec<WallPoint> {
     let lattice = field.lattice();
     (0..lattice.columns)
         .map(|column| lattice.node(row, column))
@@ -74,7 +74,8 @@ fn angle_rad(wall: WallPoint, field: &RadialField) -> f64 {
     TAU * wall.s_m / field.lattice().perimeter_m
 }
 
-fn angles_rad(walls: &[WallPoint], field: &RadialField) -> Vec<f64> {
+/// The angles of points of a round wall from twelve o'clock, radians.
+pub(super) fn angles_rad(walls: &[WallPoint], field: &RadialField) -> Vec<f64> {
     walls.iter().map(|wall| angle_rad(*wall, field)).collect()
 }
 

@@ -43,6 +43,7 @@ mod deviation;
 mod diameters;
 mod functional;
 mod grid;
+mod node_errors;
 mod outline;
 mod profile;
 mod section;
@@ -53,6 +54,7 @@ mod test_fields;
 
 pub use deviation::{Deviation, DeviationMap, MAX_SIGMA_SHARE, deviation_sigmas_m};
 pub use grid::{DeviationGrid, PageCells};
+pub use node_errors::{NodeError, node_errors};
 pub use profile::SectionProfile;
 pub use section::{SectionDeformation, measure_sections};
 pub use sections_file::{clock_position, read_sections, sections_csv};

@@ -15,3 +15,4 @@ pub mod shape;
 pub mod shape_limits;
 pub mod unknowns;
 pub mod unseen_errors;
+pub mod wall_prior;

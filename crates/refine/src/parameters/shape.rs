@@ -178,22 +178,37 @@ impl ShapeModel {
         finest: usize,
         sigma_m: f64,
     ) -> Self {
-        let mut model = Self {
-            perimeter_m,
-            origin,
-            extent_h_m,
-            scales: vec![Scale {
-                functions: Functions::Harmonics,
-                sigma_m,
-            }],
-            dropped: Vec::new(),
-        };
+        let mut model = Self::empty(perimeter_m, origin, extent_h_m);
+        model.add(Functions::Harmonics, sigma_m);
         let mut columns = MIN_COLUMNS;
         while columns <= finest {
-            model.scales.push(model.lattice_scale(columns, sigma_m));
+            model.add(model.lattice_of(columns), sigma_m);
             columns *= 2;
         }
         model
+    }
+
+    /// A model without functions, for the wall between two chainages, metres; `origin`: node of
+    /// the lattices.
+    pub fn empty(perimeter_m: f64, origin: WallPoint, extent_h_m: [f64; 2]) -> Self {
+        Self {
+            perimeter_m,
+            origin,
+            extent_h_m,
+            scales: Vec::new(),
+            dropped: Vec::new(),
+        }
+    }
+
+    /// Adds functions of the strength `sigma_m`.
+    pub fn add(&mut self, functions: Functions, sigma_m: f64) {
+        self.scales.push(Scale { functions, sigma_m });
+    }
+
+    /// The B-splines of the lattice whose number of columns is nearest to `columns`, by ratio.
+    pub fn lattice_functions(&self, columns: f64) -> Functions {
+        let halvings = (columns / MIN_COLUMNS as f64).log2().round().max(0.0);
+        self.lattice_of(MIN_COLUMNS << halvings as usize)
     }
 
     /// The lattice of `columns` columns.
@@ -205,17 +220,14 @@ impl ShapeModel {
         }
     }
 
-    /// The scale of a lattice.
-    fn lattice_scale(&self, columns: usize, sigma_m: f64) -> Scale {
+    /// The B-splines of the lattice of `columns` columns.
+    fn lattice_of(&self, columns: usize) -> Functions {
         let [from, to] = self.extent_h_m;
         let rows = self.lattice(columns).rows_between(from, to);
-        Scale {
-            functions: Functions::Lattice {
-                columns,
-                first_row: rows.start,
-                rows: (rows.end - rows.start) as usize,
-            },
-            sigma_m,
+        Functions::Lattice {
+            columns,
+            first_row: rows.start,
+            rows: (rows.end - rows.start) as usize,
         }
     }
 
@@ -339,8 +351,7 @@ impl ShapeModel {
     /// The model with a lattice of half the spacing added, of the strength `sigma_m`.
     pub fn refined(&self, sigma_m: f64) -> Self {
         let mut model = self.clone();
-        let finer = model.lattice_scale(2 * self.finest_columns(), sigma_m);
-        model.scales.push(finer);
+        model.add(self.lattice_of(2 * self.finest_columns()), sigma_m);
         model
     }
 }

@@ -24,6 +24,13 @@
 //! more, for example that edges are straight, can. `benches/reach.py` computes the share
 //! independently.
 //!
+//! # The bound for an unknown wall
+//!
+//! Where the wall deviates from its drawing by a random field of known size, the coefficients of
+//! its shape ([`crate::parameters::shape`]) are unknowns beside the poses, with the field's prior
+//! ([`crate::parameters::wall_prior`]). All three bounds then are those of poses with the wall
+//! unknown.
+//!
 //! # Accuracy of the bound
 //!
 //! Slopes are differences over an eighth of a pixel to each side of frames with 4 × 4 times the
@@ -34,20 +41,25 @@
 //! Modulation Theory", 1968.
 
 use crate::error::RefineError;
-use crate::linear::normal_equations::{Block, NormalEquations};
+use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
 use crate::model::context::{EstimationContext, FrameWindow};
+use crate::model::frame_states::FrameStates;
 use crate::model::prior::{Prior, median_step_s, variance_ratios};
 use crate::options::RefineOptions;
 use crate::parameters::calibration::{Calibration, Kappa};
 use crate::parameters::frame_estimate::FrameEstimate;
+use crate::parameters::shape::Shape;
+use crate::parameters::wall_prior::WallPrior;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::problem::unknown_texture::UnknownTexture;
+use crate::samples::footprints::{extent_h_m, footprints};
 use crate::samples::sampling::Sampling;
 use crate::tiles::interpolation::Interpolation;
 use crate::uncertainty::covariance::Covariances;
 use nalgebra::Matrix6;
 use std::borrow::Cow;
+use std::sync::Arc;
 use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
 use tunnelstitch_core::survey::Survey;
 use tunnelstitch_geometry::camera::Camera;
@@ -75,7 +87,8 @@ pub struct PoseBounds {
 ///
 /// `fine` are its frames without noise and with [`FINER`] times as many pixels along each axis: the
 /// slopes of what a pixel sees can only be had from finer pixels. `noise_grey`: σ of a pixel, grey
-/// levels; `texture`: the spectrum of the wall's texture.
+/// levels; `texture`: the spectrum of the wall's texture; `wall`: what is known of its deformation,
+/// which the fine frames do not show.
 ///
 /// # Errors
 /// [`RefineError`]; also [`RefineError::NoOverlap`] for a survey without true poses.
@@ -84,6 +97,7 @@ pub fn pose_bounds(
     fine: &[GreyImage],
     noise_grey: f64,
     texture: &UnknownTexture,
+    wall: &WallPrior,
 ) -> Result<PoseBounds, RefineError> {
     let Some(truth) = &survey.truth else {
         return Err(RefineError::NoOverlap);
@@ -111,14 +125,14 @@ pub fn pose_bounds(
     let frames = FrameCache::of_pyramids(frames.collect());
     // The motion during readout hardly changes the information.
     let shutter = Shutter::default();
-    let context = EstimationContext {
-        planned: std::sync::Arc::clone(&survey.nominal),
+    let flat = EstimationContext {
+        planned: Arc::clone(&survey.nominal),
         is_deviation_known: survey.bend.is_some() || survey.displacement.is_some(),
-        nominal: std::sync::Arc::clone(&survey.nominal),
+        nominal: Arc::clone(&survey.nominal),
         displacement: survey.displacement.as_ref(),
         shape: None,
         points: None,
-        surface: std::sync::Arc::clone(&survey.surface),
+        surface: Arc::clone(&survey.surface),
         ignored: &survey.ignored,
         camera,
         shutter: &shutter,
@@ -129,8 +143,18 @@ pub fn pose_bounds(
         dispersion: 1.0,
         noise: 0.0,
     };
-    let estimates: Vec<FrameEstimate> =
-        poses_of(truth).into_iter().map(FrameEstimate::at).collect();
+    let frames = FrameStates {
+        estimates: poses_of(truth).into_iter().map(FrameEstimate::at).collect(),
+        rejections: vec![None; count],
+        kappa: Kappa::zeros(),
+    };
+    let extent_h_m = extent_h_m(&footprints(&flat, &frames)?);
+    let model = wall.model(survey.nominal.perimeter_m(), extent_h_m);
+    let context = EstimationContext {
+        shape: (model.blocks() > 0).then(|| Arc::new(Shape::nominal(model))),
+        ..flat
+    };
+    let estimates = frames.estimates;
     let window = FrameWindow {
         participants: 0..count,
         active: 0..count,
@@ -139,6 +163,7 @@ pub fn pose_bounds(
     };
     let sampling = Sampling {
         density: DENSITY,
+        shape: true,
         interpolation: Interpolation::Bicubic,
         ..Sampling::of(0)
     };
@@ -147,29 +172,41 @@ pub fn pose_bounds(
     let problem = PhotometricProblem::new(&context, sampling, window)?.with_known_noise(noise_grey);
     let (prior, _) = problem.prior_information(&problem.unknowns_of(&estimates));
     let with_prior = problem.linearise(&estimates)?.normal;
-    let bayesian = invert(&problem, &with_prior)?;
-    let known = invert(&problem, &subtract_pose_prior(&prior, with_prior))?;
+    let bayesian = invert(&problem, &with_prior, count)?;
+    let pixels = subtract_pose_prior(problem.pattern(), &prior, with_prior, count);
+    let known = invert(&problem, &pixels, count)?;
     let problem = problem.with_unknown_texture(texture);
-    let pixels = subtract_pose_prior(&prior, problem.linearise(&estimates)?.normal);
+    let with_prior = problem.linearise(&estimates)?.normal;
+    let pixels = subtract_pose_prior(problem.pattern(), &prior, with_prior, count);
     Ok(PoseBounds {
         known,
-        unknown: invert(&problem, &pixels)?,
+        unknown: invert(&problem, &pixels, count)?,
         bayesian,
     })
 }
 
-/// Subtracts the prior of the poses from the normal equations; exposures keep theirs.
-fn subtract_pose_prior(prior: &[Block], mut normal: NormalEquations) -> NormalEquations {
-    for (block, prior) in normal.blocks.iter_mut().zip(prior) {
+/// Subtracts the prior of the poses of `count` frames from the normal equations; exposures and shape
+/// keep theirs.
+fn subtract_pose_prior(
+    pattern: &Pattern,
+    prior: &[Block],
+    mut normal: NormalEquations,
+    count: usize,
+) -> NormalEquations {
+    // Blocks are in the order of their columns, those of the frames first.
+    let of_frames: usize = (0..count).map(|column| pattern.rows(column).len()).sum();
+    let blocks = normal.blocks.iter_mut().zip(prior);
+    for (block, prior) in blocks.take(of_frames) {
         *block -= pose_part(prior);
     }
     normal
 }
 
-/// Inverts an information matrix, for each frame and for each pair of neighbours.
+/// Inverts an information matrix, for each of `count` frames and for each pair of neighbours.
 fn invert(
     problem: &PhotometricProblem,
     normal: &NormalEquations,
+    count: usize,
 ) -> Result<Covariances, RefineError> {
     let inverse = SelectedInverse::new(problem.pattern(), normal)
         .map_err(|source| problem.factor_error(source))?;
@@ -179,7 +216,6 @@ fn invert(
             block.fixed_view::<6, 6>(0, 0).into_owned()
         })
     };
-    let count = normal.gradient.len();
     Ok(Covariances {
         frames: (0..count).map(|k| pose(k, k)).collect(),
         next: (1..count).map(|k| pose(k - 1, k)).collect(),
