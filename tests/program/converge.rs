@@ -50,3 +50,26 @@ fn the_efficiency_is_measured_against_the_bound() {
     }
     assert!((1.0..20.0).contains(&number("normalised_error")), "{table}");
 }
+
+/// On a deformed wall the bounds are those of an unknown one, and the deformation that is found is
+/// right within its σ.
+#[test]
+fn the_efficiency_on_a_deformed_wall_covers_its_deformation() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("walls");
+    let options = "--efficiency --frames 30 --size 160x120 --seeds 1 --quiet --ovality-mm 10 \
+                   --undulation-mm 4 --undulation-length-m 1";
+    let mut arguments = vec!["converge", "--out", text(&out)];
+    arguments.extend(options.split(' '));
+    succeed(&arguments);
+    let row = &json(&out.join("efficiency.json"))[0];
+    let deformation = |name: &str| row["deformation"][name].as_f64().unwrap();
+    assert!(deformation("nodes") > 100.0, "{row}");
+    assert!(deformation("error_mm") < 6.0, "{row}");
+    assert!(
+        (0.2..3.0).contains(&deformation("normalised_error")),
+        "{row}"
+    );
+    let ratio = row["bayesian_ratio"]["pose"].as_f64().unwrap();
+    assert!((0.4..4.0).contains(&ratio), "{row}");
+}

@@ -1,7 +1,7 @@
 //! Local contrast normalisation, for comparing frames before lighting and exposure are known.
 
 use super::grey::GreyImage;
-use super::windows::{Moments, Windows};
+use super::windows::{Moments, window_moments};
 use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
 
 /// Half width of the largest window relative to the image's shorter side.
@@ -38,8 +38,7 @@ const MAX_DETAIL_SIGMAS: f32 = 1.5;
 pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
     let w = image.width();
     let values = clip_detail(image, reach, MAX_DETAIL_SIGMAS);
-    let windows = Windows::new(&values, w, [reach; 2]);
-    let moments: Vec<Moments> = windows.moments().collect();
+    let moments = window_moments(&values, w, [reach; 2]);
     let overall = moments.iter().map(|m| m.variance).sum::<f32>() / moments.len().max(1) as f32;
     let floor = MIN_SPREAD_FRACTION * MIN_SPREAD_FRACTION * overall + 1e-6;
     let picture = |value: &dyn Fn(f32, &Moments) -> f32| {
@@ -67,8 +66,8 @@ fn clip_detail(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
 /// The means over windows of `2 reach + 1` pixels, and the robust σ of the deviations from them (0
 /// for an image without values).
 fn detail(image: &GreyImage, reach: usize) -> (Vec<f32>, f32) {
-    let windows = Windows::new(image.data(), image.width(), [reach; 2]);
-    let means: Vec<f32> = windows.moments().map(|m| m.mean).collect();
+    let moments = window_moments(image.data(), image.width(), [reach; 2]);
+    let means: Vec<f32> = moments.into_iter().map(|m| m.mean).collect();
     let pixels = image.data().iter().zip(&means);
     let mut sizes: Vec<f32> = pixels
         .map(|(value, mean)| (value - mean).abs())

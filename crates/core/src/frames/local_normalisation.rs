@@ -15,7 +15,7 @@
 
 use super::grey::GreyImage;
 use super::noise::noise_sigma;
-use super::windows::Windows;
+use super::windows::window_means;
 
 /// Half height of the window of the mean over the frame's shorter side: a standard deviation of a
 /// 72nd, for two passes.
@@ -53,7 +53,7 @@ pub fn normalise_locally(image: &GreyImage) -> GreyImage {
     let half_height = reach(MEAN_HALF_HEIGHT);
     let mean_window = [(MEAN_ASPECT * half_height as f64) as usize, half_height];
     let half_side = reach(SPREAD_HALF_SIDE);
-    let means = |values: &[f32], window| Windows::new(values, width, window).means();
+    let means = |values: &[f32], window| window_means(values, width, window);
     let mean = means(&means(&known, mean_window), mean_window);
     let detail: Vec<f32> = known.iter().zip(&mean).map(|(v, m)| v - m).collect();
     let squares: Vec<f32> = detail.iter().map(|d| d * d).collect();
