@@ -1,8 +1,10 @@
 //! Readings of a survey's poses and pictures that people get wrong, to be told by the pictures.
 
 use super::error::SurveyError;
+use super::interpreted_poses::InterpretedPoses;
 use super::open::Survey;
-use super::pose_reader::{InterpretedPoses, PoseReader};
+use super::pose_reader::PoseReader;
+use super::pose_shift::shifted;
 use super::pose_validation::feasible_conventions;
 use super::poses_section::PosesSection;
 use crate::frames::PictureOrientation;
@@ -16,6 +18,9 @@ const UNITS: [(&str, f64); 3] = [
     ("centimetres", 0.01),
     ("feet", 0.3048),
 ];
+
+/// Places that poses may be off by, later or earlier.
+const SHIFTS: [isize; 6] = [1, -1, 2, -2, 3, -3];
 
 /// Pictures may be stored otherwise than the camera saw them.
 const ORIENTATIONS: [(&str, PictureOrientation); 3] = [
@@ -39,6 +44,8 @@ pub struct PoseReading {
     pub initial: Trajectory,
     /// The orientation of the pictures against the one given.
     pub orientation: PictureOrientation,
+    /// Places by which the poses belong to later frames than given; earlier if it is negative.
+    pub shift_frames: isize,
 }
 
 impl PoseReading {
@@ -49,14 +56,21 @@ impl PoseReading {
             changes,
             initial,
             orientation: PictureOrientation::Stored,
+            shift_frames: 0,
         }
+    }
+
+    /// True if the reading has a pose of the file for frame `k`.
+    pub fn has_pose_of(&self, k: usize) -> bool {
+        let own = k.checked_add_signed(-self.shift_frames);
+        own.is_some_and(|own| own < self.initial.len())
     }
 }
 
 impl Survey {
     /// The initial poses as given, followed by every other reading that leaves all cameras inside:
-    /// other conventions, the reverse order, quaternions that begin with w, other units, and
-    /// pictures that are turned or mirrored.
+    /// other conventions, the reverse order, quaternions that begin with w, other units, poses of
+    /// other frames, and pictures that are turned or mirrored.
     ///
     /// # Errors
     /// The errors of [`Survey::open`], if the file has changed since.
@@ -73,6 +87,7 @@ impl Survey {
         });
         let poses = conventions
             .chain(other_texts(section, &given))
+            .chain(self.shifted_readings(&given))
             .filter(|reading| is_inside(surface, &reading.initial))
             .map(|reading| PoseReading {
                 initial: self.carried(reading.initial),
@@ -93,6 +108,33 @@ impl Survey {
         let others = poses.chain(pictures);
         Ok(std::iter::once(as_given.clone()).chain(others).collect())
     }
+
+    /// Readings whose poses belong to the frames a few places later or earlier.
+    fn shifted_readings(&self, given: &InterpretedPoses) -> Vec<PoseReading> {
+        let section = &self.file.poses;
+        let wanted = SHIFTS
+            .into_iter()
+            .filter(|_| section.shift_frames.is_none());
+        let reading = |shift_frames: isize| {
+            let path = self.folder.join(&section.initial);
+            // Too few frames, or no way on from the last pose: no such reading.
+            let poses = shifted(given.clone(), shift_frames, &path, &self.frames).ok()?;
+            let remedy = shift_remedy(shift_frames);
+            Some(PoseReading {
+                shift_frames,
+                ..PoseReading::of_poses(remedy, 1, poses.trajectory())
+            })
+        };
+        wanted.filter_map(reading).collect()
+    }
+}
+
+/// Poses of other frames, and the line that reads them so.
+fn shift_remedy(shift_frames: isize) -> String {
+    let count = shift_frames.unsigned_abs();
+    let frames = if count == 1 { "frame" } else { "frames" };
+    let direction = if shift_frames > 0 { "later" } else { "earlier" };
+    format!("the poses {count} {frames} {direction} (shift_frames = {shift_frames} under [poses])")
 }
 
 /// Readings of the file's text other than that of a section: the order of its quaternions and of
