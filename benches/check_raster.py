@@ -5,8 +5,8 @@
     python3 benches/check_raster.py DIR/*.tif DIR/*.dzi
 
 For every .tif: rio-cogeo's validation without errors or warnings, the blocks' leaders and trailers and their order, the
-geotransform, every tile through tifffile, the pixels through GDAL in windows, and every overview against the level
-before it. For every .dzi: all tiles of all levels and their sizes. Prints what was verified; ends with status 1 if anything is wrong.
+geotransform, unit and axes of the plane, every tile through tifffile, the pixels through GDAL in windows, and every
+overview against the level before it. For every .dzi: all tiles of all levels and their sizes. Prints what was verified; ends with status 1 if anything is wrong.
 
 Needs from PyPI: imagecodecs, numpy, pillow, rasterio, rio-cogeo, tifffile.
 """
@@ -133,7 +133,11 @@ def check_tif(path):
         nodata, factors, dtype = src.nodata, src.overviews(1), np.dtype(src.dtypes[0])
         first = dtype == np.uint32
         t = src.transform
-        said.append(f"origin ({t.c}, {t.f}), steps ({t.a}, {t.e}), {src.crs.to_wkt()[:12] if src.crs else 'no'}… crs")
+        crs = src.crs.to_wkt() if src.crs else ""
+        axes = re.findall(r'AXIS\["([^"]+)",(\w+)\]', crs)
+        demand(axes == [("Chainage", "EAST"), ("Arc length", "NORTH")], f"the axes are {axes}")
+        demand('UNIT["metre",1' in crs, "the unit is no metre")
+        said.append(f"origin ({t.c}, {t.f}), steps ({t.a}, {t.e}), {crs[:12]}… crs with its axes")
         pixels = level_pixels(path, 0, masked)
         right, lower = src.width - 130, src.height - 45
         for window in (Window(right // 3, lower // 2, 77, 43), Window(right, lower, 130, 45)):

@@ -9,7 +9,7 @@ use tiff::tags::Tag;
 struct Tags {
     /// From column and row of a corner to x and y, row by row (OGC GeoTIFF, tag 34264).
     matrix: Vec<f64>,
-    /// Name of the plane.
+    /// Name of the plane, and the plane as well-known text.
     plane: String,
     /// GDAL's metadata.
     metadata: String,
@@ -76,6 +76,12 @@ fn panoramas_and_maps_lie_in_the_plane_of_chainage_and_arc_length() {
             assert!((y_m - arc_m).abs() < 1e-9, "{layout} {y_m} {arc_m}");
             assert!(
                 tags.plane.contains("x chainage, y arc length"),
+                "{}",
+                tags.plane
+            );
+            assert!(
+                tags.plane
+                    .contains("AXIS[\"Chainage\",EAST],AXIS[\"Arc length\",NORTH]"),
                 "{}",
                 tags.plane
             );

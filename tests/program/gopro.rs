@@ -1,7 +1,11 @@
 //! Initial poses from the gyro in a GoPro's video, through the program.
 
-use crate::support::{fail, succeed, text};
+use crate::support::missing::is_ffmpeg_missing;
+use crate::support::{blender_survey, fail, succeed, text};
 use nalgebra::{UnitQuaternion, Vector3};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
 use tunnelstitch::trajectory::{poses_of, tum};
 
 /// Rates and accelerations of a payload of one second.
@@ -36,6 +40,12 @@ fn stream(key: &str, scale: u16, value: impl Fn(usize) -> [i16; 3]) -> Vec<u8> {
     klv("STRM", 0, 1, &[scale, klv(key, b's', 6, &values)].concat())
 }
 
+/// The camera's settings in the box `udta`, with a readout time of 24 ms.
+fn settings() -> Vec<u8> {
+    let readout = klv("SROT", b'f', 4, &24.0f32.to_be_bytes());
+    mp4_box("udta", &mp4_box("GPMF", &klv("DEVC", 0, 1, &readout)))
+}
+
 /// A video of a HERO5, upright: three seconds at rest, then four with an even turn to the left of
 /// 0.5 rad/s, with a bias of 0.01 and noise of 0.001 rad/s.
 fn video(format: &str) -> Vec<u8> {
@@ -65,11 +75,14 @@ fn video(format: &str) -> Vec<u8> {
         mp4_box("mdhd", &words(&[0, 0, 0, 1000, 7000, 0])),
         mp4_box("minf", &mp4_box("stbl", &table.concat())),
     ];
-    let index = mp4_box("trak", &mp4_box("mdia", &media.concat()));
+    let index = [
+        settings(),
+        mp4_box("trak", &mp4_box("mdia", &media.concat())),
+    ];
     let parts = [
         mp4_box("ftyp", b"mp41"),
         mp4_box("mdat", &payloads.concat()),
-        mp4_box("moov", &index),
+        mp4_box("moov", &index.concat()),
     ];
     parts.concat()
 }
@@ -96,7 +109,13 @@ fn a_gopros_own_video_makes_poses() {
     .concat();
     std::fs::write(&path, video("gpmd")).unwrap();
     let said = succeed(&all);
-    assert!(said.contains("100.0 per second"), "{said}");
+    assert!(
+        said.contains("100.0 per second") && said.contains("under [camera]: readout_ms = 24"),
+        "{said}"
+    );
+    let said = succeed(&[&all[..], &["--json"]].concat());
+    let said: Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(said["readout_ms"], 24.0);
     let poses = poses_of(&tum::read(&out).unwrap());
     // To the left is about −y of the camera.
     let turned = (poses[0].r_wc.inverse() * poses[2].r_wc).scaled_axis();
@@ -110,4 +129,37 @@ fn a_gopros_own_video_makes_poses() {
     std::fs::write(&path, video("fdsc")).unwrap();
     let message = fail(&all, 3);
     assert!(message.contains("has no track `gpmd`"), "{message}");
+}
+
+/// Writes a video of some frames whose index begins with the settings of a GoPro.
+fn write_video_with_settings(path: &Path) {
+    let pictures = blender_survey().join("frames/%06d.jpg");
+    let output = Command::new("ffmpeg")
+        .args(["-v", "error", "-nostdin", "-framerate", "1", "-i"])
+        .args([text(&pictures), "-frames:v", "3", text(path)])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let mut video = std::fs::read(path).unwrap();
+    // The index is the last box.
+    let at = video.windows(4).rposition(|word| word == b"moov").unwrap();
+    let size = (video.len() - at + 4 + settings().len()) as u32;
+    video[at - 4..at].copy_from_slice(&size.to_be_bytes());
+    video.splice(at + 4..at + 4, settings());
+    std::fs::write(path, video).unwrap();
+}
+
+#[test]
+fn init_writes_the_readout_time_that_a_video_states() {
+    if is_ffmpeg_missing() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    write_video_with_settings(&dir.path().join("GX010001.MP4"));
+    let camera = blender_survey().join("camera.json");
+    std::fs::copy(camera, dir.path().join("camera.json")).unwrap();
+    let arguments = ["init", text(dir.path()), "--radius-m", "3"];
+    let said = succeed(&arguments);
+    let survey = std::fs::read_to_string(dir.path().join("survey.toml")).unwrap();
+    assert!(survey.contains("\nreadout_ms = 24 "), "{said} {survey}");
 }

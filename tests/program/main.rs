@@ -41,6 +41,7 @@ mod report;
 mod resume;
 mod rolling;
 mod shapes;
+mod shifted_poses;
 mod simulate;
 mod simulated_walls;
 mod skipped_frames;

@@ -9,7 +9,7 @@ use crate::unaligned_error::{UnalignedError, unaligned_error};
 use crate::wall_error::{WallError, wall_error};
 use serde::{Deserialize, Serialize};
 use tunnelstitch_core::frames::FrameSet;
-use tunnelstitch_core::progress::Progress;
+use tunnelstitch_core::progress::{JobStage, Progress};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
@@ -118,11 +118,21 @@ pub fn compare(
     let loaded = frames.load_all(progress);
     loaded.map_err(|source| candidates.fail(source))?;
 
+    let mut stages = panorama_stages(2 + usize::from(candidates.truth.is_some()));
+    let mut enter_next = || {
+        if let Some(stage) = stages.next() {
+            progress.enter_job_stage(stage);
+        }
+    };
     let true_panorama = match &candidates.truth {
-        Some(truth) => Some(truth.render(input, &mut frames, &canvas, progress)?),
+        Some(truth) => {
+            enter_next();
+            Some(truth.render(input, &mut frames, &canvas, progress)?)
+        }
         None => None,
     };
     let mut score = |candidate: &PlacedPoses| -> Result<(Scores, ComparedPanorama), EvaluateError> {
+        enter_next();
         let compared = candidate.render(input, &mut frames, &canvas, progress)?;
         let mut scores = Scores::without_truth(&compared);
         if let (Some(poses), Some(truth)) = (input.truth, &true_panorama) {
@@ -140,6 +150,7 @@ pub fn compare(
     };
     let (baseline_scores, baseline_panorama) = score(&candidates.baseline)?;
     let (refined_scores, refined_panorama) = score(&candidates.refined)?;
+    progress.leave_job();
     Ok((
         Comparison {
             frames: input.files.len(),
@@ -154,6 +165,17 @@ pub fn compare(
             truth: true_panorama,
         },
     ))
+}
+
+/// The stages of drawing so many panoramas, which take the same time: they are of one canvas.
+fn panorama_stages(count: usize) -> impl Iterator<Item = JobStage> {
+    let share = 1.0 / count as f64;
+    (0..count).map(move |k| JobStage {
+        number: k + 1,
+        of: count,
+        done_share: k as f64 * share,
+        share,
+    })
 }
 
 /// The panoramas of a comparison before they are drawn.
@@ -317,5 +339,22 @@ impl<'a> Candidates<'a> {
             canvas,
             memory_bytes,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_panorama_is_a_share_of_the_job() {
+        let stages: Vec<JobStage> = panorama_stages(3).collect();
+        let mut done_share = 0.0;
+        for (k, stage) in stages.iter().enumerate() {
+            assert_eq!((stage.number, stage.of), (k + 1, 3));
+            assert!((stage.done_share - done_share).abs() < 1e-12, "{stage:?}");
+            done_share += stage.share;
+        }
+        assert!((done_share - 1.0).abs() < 1e-12);
     }
 }

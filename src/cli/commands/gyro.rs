@@ -305,6 +305,7 @@ fn suggest_prior(
         clock_correlation: baseline.clock.map(|clock| clock.correlation),
         turned_deg: baseline.turned_rad.to_degrees(),
         step_sigma_deg: baseline.step_sigma_rad.to_degrees(),
+        readout_ms: readout_ms.flatten(),
     })
 }
 
@@ -320,6 +321,8 @@ struct GyroReport<'a> {
     clock_correlation: Option<f64>,
     turned_deg: f64,
     step_sigma_deg: f64,
+    /// As `camera.readout_ms` in survey.toml; null if the log states none, or one sideways.
+    readout_ms: Option<f64>,
 }
 
 /// Prints rest, bias, clock and turn.

@@ -1,6 +1,7 @@
 //! Tags of a GeoTIFF beside the picture: its place in a plane, and its quantity.
 //!
-//! Source: OGC GeoTIFF 1.1 (19-008r4), annex B; GDAL's metadata in TIFF files (tag 42112).
+//! Source: OGC GeoTIFF 1.1 (19-008r4), annex B; the texts of coordinate systems that GDAL's driver
+//! GTiff reads from key 3073 (`gt_wkt_srs.cpp`); GDAL's metadata in TIFF files (tag 42112).
 
 use super::directory::{Values, tag};
 use super::spec::{Georeference, Quantity};
@@ -10,14 +11,19 @@ const USER_DEFINED: u16 = 32767;
 /// The code of the metre.
 const METRE: u16 = 9001;
 
-/// The georeference: a plane in metres with a name, neither geographic nor projected. The matrix
-/// supports axes of any direction.
+/// Words before the text of a coordinate system in its citation, as Esri's programs write them and
+/// GDAL reads them. No other key of a GeoTIFF names axes.
+const COORDINATE_SYSTEM_TEXT: &str = "ESRI PE String = ";
+
+/// The georeference: a plane in metres with a name and axes, neither geographic nor projected. The
+/// matrix supports axes of any direction.
 pub(super) fn geo_tags(georeference: &Georeference) -> [(u16, Values); 3] {
     let Georeference {
         plane,
         origin_m: [x, y],
         column_m: [column_x, column_y],
         row_m: [row_x, row_y],
+        ..
     } = *georeference;
     #[rustfmt::skip]
     let matrix = vec![
@@ -27,20 +33,39 @@ pub(super) fn geo_tags(georeference: &Georeference) -> [(u16, Values); 3] {
         0.0,      0.0,   0.0, 1.0,
     ];
     // Texts of keys end in `|`.
-    let citation = format!("{plane}|");
+    let name = format!("{plane}|");
+    let system = format!(
+        "{COORDINATE_SYSTEM_TEXT}{}|",
+        coordinate_system(georeference)
+    );
+    let [name_len, system_len] = [&name, &system].map(|text| text.len() as u16);
     #[rustfmt::skip]
     let keys = vec![
-        1, 1, 0, 4, // version, revision, number of keys
+        1, 1, 0, 5, // version, revision, number of keys
         1024, 0, 1, USER_DEFINED, // model type
         1025, 0, 1, 1, // raster type: pixel is area
-        1026, tag::GEO_ASCII_PARAMS, citation.len() as u16, 0, // name
+        1026, tag::GEO_ASCII_PARAMS, name_len, 0, // name
+        3073, tag::GEO_ASCII_PARAMS, system_len, name_len, // axes
         3076, 0, 1, METRE, // unit
     ];
     [
         (tag::MODEL_TRANSFORMATION, Values::Double(matrix)),
         (tag::GEO_KEY_DIRECTORY, Values::Short(keys)),
-        (tag::GEO_ASCII_PARAMS, Values::Ascii(citation)),
+        (tag::GEO_ASCII_PARAMS, Values::Ascii(name + &system)),
     ]
+}
+
+/// The plane as well-known text (OGC 01-009, 7.2). Directions are those in which programs draw.
+fn coordinate_system(georeference: &Georeference) -> String {
+    let Georeference {
+        plane,
+        axes: [x, y],
+        ..
+    } = georeference;
+    format!(
+        "LOCAL_CS[\"{plane}\",LOCAL_DATUM[\"{plane}\",32767],UNIT[\"metre\",1],\
+         AXIS[\"{x}\",EAST],AXIS[\"{y}\",NORTH]]"
+    )
 }
 
 /// Name and unit of the first band, as GDAL reads them.
@@ -64,6 +89,7 @@ mod tests {
     fn a_turned_picture_has_its_steps_in_the_columns_of_the_matrix() {
         let [matrix, keys, citation] = geo_tags(&Georeference {
             plane: "plane",
+            axes: ["along", "around"],
             origin_m: [10.0, 20.0],
             column_m: [0.0, 0.5],
             row_m: [0.25, 0.0],
@@ -72,12 +98,15 @@ mod tests {
             panic!("{matrix:?}");
         };
         assert_eq!(matrix[..8], [0.0, 0.25, 0.0, 10.0, 0.5, 0.0, 0.0, 20.0]);
-        assert_eq!(citation.1, Values::Ascii("plane|".to_owned()));
+        let system = "ESRI PE String = LOCAL_CS[\"plane\",LOCAL_DATUM[\"plane\",32767],\
+                      UNIT[\"metre\",1],AXIS[\"along\",EAST],AXIS[\"around\",NORTH]]";
+        assert_eq!(citation.1, Values::Ascii(format!("plane|{system}|")));
         let Values::Short(keys) = keys.1 else {
             panic!("{keys:?}");
         };
         assert_eq!(keys.len(), 4 * (1 + usize::from(keys[3])));
         assert_eq!(keys[12..16], [1026, 34737, 6, 0]);
+        assert_eq!(keys[16..20], [3073, 34737, system.len() as u16 + 1, 6]);
     }
 
     #[test]

@@ -63,8 +63,10 @@ pub enum Nodata {
 /// takes its columns and rows to these axes: the determinant of both steps is negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Georeference {
-    /// Name of the plane and of its axes, ASCII without `|`.
+    /// Name of the plane, ASCII without `|` and `"`.
     pub plane: &'static str,
+    /// Names of x and y, ASCII without `|` and `"`.
+    pub axes: [&'static str; 2],
     /// x and y of the upper left corner of the first pixel, metres.
     pub origin_m: [f64; 2],
     /// Change of x and y from a column to the next one to the right, metres.

@@ -11,6 +11,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::camera::{Camera, read_calibration_of};
 use tunnelstitch_geometry::recordings::is_recording;
+use tunnelstitch_geometry::trajectory::gyro::gopro_readout_ms;
 use tunnelstitch_geometry::trajectory::{
     DuplicateTimes, PoseFile, PoseFileOptions, read_poses_with,
 };
@@ -38,6 +39,8 @@ pub struct VideoChoice {
     pub count: usize,
     /// Width and height, pixels.
     pub size: (u32, u32),
+    /// Readout time of the rolling shutter that the video of a GoPro states, milliseconds.
+    pub readout_ms: Option<f64>,
 }
 
 /// The parts of a survey found in a folder; all paths are relative to the folder.
@@ -200,11 +203,15 @@ impl Discovery {
         every: usize,
     ) -> Result<(), FrameError> {
         let video = Video::open(&folder.join(path))?;
+        // The rows of a turned picture are not read one after the other.
+        let has_rows = video.rotation_deg() == 0;
+        let readout_ms = gopro_readout_ms(video.path()).filter(|_| has_rows);
         self.video = Some(VideoChoice {
             path: path.to_owned(),
             every,
             count: video.pictures().div_ceil(every.max(1)),
             size: video.size(),
+            readout_ms,
         });
         self.sort();
         Ok(())

@@ -3,6 +3,7 @@
 use super::associate::Associate;
 use super::error::SurveyError;
 use super::open::Survey;
+use super::poses_section::PosesSection;
 use std::path::Path;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{Pose, poses_of};
@@ -39,7 +40,12 @@ impl Survey {
             );
         }
         let path = self.folder.join(&section.initial);
-        let all = self.read_as(section, &path, planned, section.missing_poses())?;
+        // A shift counts the frames that are selected.
+        let unmoved = PosesSection {
+            shift_frames: None,
+            ..section.clone()
+        };
+        let all = self.read_as(&unmoved, &path, planned, section.missing_poses())?;
         let kept = keyframe_indices(&poses_of(&all.trajectory), step_deg.to_radians());
         self.frames = self.frames.only(&kept);
         if let Some(times_s) = &mut self.times_s {

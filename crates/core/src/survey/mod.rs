@@ -33,7 +33,7 @@
 //!
 //! [poses]
 //! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC: see the content
-//! truth = "groundtruth.tum"   # optional: for comparison; all keys below apply to both
+//! truth = "groundtruth.tum"   # optional: for comparison; read like the initial poses
 //! format = "tum"              # optional, like all below: overrides the detection
 //! topic = "/odom"             # in a recording with several topics of poses
 //! parent = "map"              # in a recording: the frames of reference of a transform
@@ -47,6 +47,9 @@
 //! associate = "time"          # or "name" (default if the file has names), or "order"
 //! time_tolerance_s = 0.01     # largest difference of times; the default
 //! interpolate = true          # by default the nearer pose is taken
+//! reversed = true             # poses in the reverse order of the frames
+//! shift_frames = 2            # the initial poses belong to the frames two places later
+//! unit_m = 0.001              # length of the file's unit
 //! as_built = true             # not to be carried along the bend of shape_file
 //!
 //! [prior]                     # optional: noise of the initial poses
@@ -92,6 +95,7 @@ mod frame_paths;
 mod frame_skipping;
 mod frame_times;
 mod ignore;
+mod interpreted_poses;
 mod keyframe_selection;
 mod left_aside;
 mod masked_wall;
@@ -103,6 +107,7 @@ mod picture_motion;
 mod pose_conflicts;
 mod pose_reader;
 mod pose_readings;
+mod pose_shift;
 mod pose_validation;
 mod poses_section;
 mod readout;

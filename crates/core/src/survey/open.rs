@@ -191,8 +191,12 @@ impl Survey {
         let mut warnings = read.warnings;
         let truth = match &section.truth {
             Some(truth) => {
+                let section = PosesSection {
+                    shift_frames: None,
+                    ..section.clone()
+                };
                 let read = survey.read_as(
-                    section,
+                    &section,
                     &survey.folder.join(truth),
                     survey.surface.as_ref(),
                     MissingPoses::Refuse,

@@ -3,8 +3,10 @@
 use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by_order, by_time};
 use super::error::SurveyError;
 use super::frame_times;
-use super::missing_poses::{self, MissingPoses, PoseGap};
+use super::interpreted_poses::InterpretedPoses;
+use super::missing_poses::{self, MissingPoses};
 use super::pose_conflicts::{FrameConflict, frame_conflicts};
+use super::pose_shift::shifted;
 use super::poses_section::PosesSection;
 use super::skipped_frame::SkippedFrame;
 use crate::frames::FrameFile;
@@ -12,8 +14,8 @@ use std::borrow::Cow;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::{
-    Convention, Pose, PoseFile, PoseFormat, StampedPose, Trajectory, poses_of, read_camera_in_body,
-    read_poses_with, read_tunnel_frame,
+    Convention, Pose, PoseFile, PoseFormat, Trajectory, read_camera_in_body, read_poses_with,
+    read_tunnel_frame,
 };
 
 /// The frames that poses are read for.
@@ -33,71 +35,6 @@ pub(super) struct PoseReader<'a> {
     camera_in_body: Option<Pose>,
     tunnel_in_world: Option<Pose>,
     frames: FramesToPose<'a>,
-}
-
-/// The poses of a file, one per frame, with their convention.
-pub(super) struct InterpretedPoses {
-    /// The poses in the file's convention.
-    pub given: Trajectory,
-    /// The convention.
-    pub convention: Convention,
-    /// The file's format.
-    pub format: PoseFormat,
-    /// The frames that the file leaves out.
-    pub gaps: Vec<PoseGap>,
-    /// Times that the file has twice with different poses.
-    pub conflicts: Vec<FrameConflict>,
-}
-
-impl InterpretedPoses {
-    /// The poses in the tunnel's frame.
-    pub fn trajectory(&self) -> Trajectory {
-        self.trajectory_in(&self.convention)
-    }
-
-    /// The poses in the tunnel's frame, interpreted in another convention.
-    pub fn trajectory_in(&self, convention: &Convention) -> Trajectory {
-        let in_tunnel = |stamped: &StampedPose| StampedPose {
-            time_s: stamped.time_s,
-            pose: convention.to_tunnel(&stamped.pose),
-        };
-        self.given.iter().map(in_tunnel).collect()
-    }
-
-    /// The poses in the tunnel's frame, interpreted in another convention, without their times.
-    pub fn poses_in(&self, convention: &Convention) -> Vec<Pose> {
-        poses_of(&self.trajectory_in(convention))
-    }
-
-    /// The file's poses with positions of another unit, metres.
-    pub fn in_unit(&self, unit_m: f64) -> Self {
-        self.changed(|pose| Pose::new(pose.r_wc, pose.t_wc * unit_m))
-    }
-
-    /// The file's poses in reverse order, at the times of the frames.
-    pub fn reversed(&self) -> Self {
-        self.with_poses(self.given.iter().rev().map(|stamped| stamped.pose))
-    }
-
-    /// The file's poses, each changed.
-    pub fn changed(&self, change: impl Fn(&Pose) -> Pose) -> Self {
-        self.with_poses(self.given.iter().map(|stamped| change(&stamped.pose)))
-    }
-
-    /// Other poses at the times of the frames.
-    fn with_poses(&self, poses: impl Iterator<Item = Pose>) -> Self {
-        let times_s = self.given.iter().map(|stamped| stamped.time_s);
-        let stamped = times_s.zip(poses);
-        Self {
-            given: stamped
-                .map(|(time_s, pose)| StampedPose { time_s, pose })
-                .collect(),
-            convention: self.convention,
-            format: self.format,
-            gaps: self.gaps.clone(),
-            conflicts: self.conflicts.clone(),
-        }
-    }
 }
 
 impl<'a> PoseReader<'a> {
@@ -205,10 +142,14 @@ impl<'a> PoseReader<'a> {
             Some(unit_m) => read.in_unit(unit_m),
             None => read,
         };
-        Ok(match self.section.reversed {
+        let read = match self.section.reversed {
             Some(true) => read.reversed(),
             _ => read,
-        })
+        };
+        match self.section.shift_frames {
+            Some(shift_frames) => shifted(read, shift_frames, path, frames),
+            None => Ok(read),
+        }
     }
 
     /// Associates the poses of a file by the times of the frames, and names its contradictions.

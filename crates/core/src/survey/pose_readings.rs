@@ -3,8 +3,10 @@
 
 use super::calibrate::CalibrationGroup;
 use super::error::SurveyError;
+use super::interpreted_poses::InterpretedPoses;
 use super::open::Survey;
-use super::pose_reader::{InterpretedPoses, PoseReader};
+use super::pose_reader::PoseReader;
+use super::pose_shift::shifted;
 use super::pose_validation::feasible_conventions;
 use super::poses_section::PosesSection;
 use crate::frames::PictureOrientation;
@@ -22,6 +24,9 @@ const UNITS: [(&str, f64); 3] = [
 
 /// Focal lengths over the given one that are tried: nearer ones are found by estimating them.
 const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
+
+/// Places that poses may be off by, later or earlier.
+const SHIFTS: [isize; 6] = [1, -1, 2, -2, 3, -3];
 
 /// Pictures may be stored otherwise than the camera saw them.
 const ORIENTATIONS: [(&str, PictureOrientation); 3] = [
@@ -47,6 +52,8 @@ pub struct PoseReading {
     pub orientation: PictureOrientation,
     /// The focal length over the given one.
     pub focal_factor: f64,
+    /// Places by which the poses belong to later frames than given; earlier if it is negative.
+    pub shift_frames: isize,
 }
 
 impl PoseReading {
@@ -58,6 +65,7 @@ impl PoseReading {
             initial,
             orientation: PictureOrientation::Stored,
             focal_factor: 1.0,
+            shift_frames: 0,
         }
     }
 
@@ -69,12 +77,18 @@ impl PoseReading {
             ..*given
         }
     }
+
+    /// True if the reading has a pose of the file for frame `k`.
+    pub fn has_pose_of(&self, k: usize) -> bool {
+        let own = k.checked_add_signed(-self.shift_frames);
+        own.is_some_and(|own| own < self.initial.len())
+    }
 }
 
 impl Survey {
     /// The initial poses as given, followed by every other reading that leaves all cameras inside:
-    /// other conventions, the reverse order, quaternions that begin with w, other units, pictures
-    /// that are turned or mirrored, and other focal lengths.
+    /// other conventions, the reverse order, quaternions that begin with w, other units, poses of
+    /// other frames, pictures that are turned or mirrored, and other focal lengths.
     ///
     /// # Errors
     /// The errors of [`Survey::open`], if the file has changed since.
@@ -91,6 +105,7 @@ impl Survey {
         });
         let poses = conventions
             .chain(other_texts(section, &given))
+            .chain(self.shifted_readings(&given))
             .filter(|reading| is_inside(surface, &reading.initial))
             .map(|reading| PoseReading {
                 initial: self.carried(reading.initial),
@@ -108,10 +123,20 @@ impl Survey {
             orientation,
             ..as_given.clone()
         });
-        let estimates_focal = (self.file.calibrate.iter())
-            .any(|section| section.unknowns.contains(&CalibrationGroup::Focal));
-        let factors = FOCAL_FACTORS.into_iter().filter(|_| !estimates_focal);
-        let lenses = factors.map(|focal_factor| PoseReading {
+        let lenses = self.other_focal_lengths(&as_given);
+        let others = poses.chain(pictures).chain(lenses);
+        Ok(std::iter::once(as_given.clone()).chain(others).collect())
+    }
+
+    /// Readings of another focal length than given, beyond those that refining searches by itself.
+    fn other_focal_lengths(&self, as_given: &PoseReading) -> impl Iterator<Item = PoseReading> {
+        let section = self.file.calibrate.as_ref();
+        let searched =
+            section.filter(|section| section.unknowns.contains(&CalibrationGroup::Focal));
+        let reach = searched.map_or(0.0, |section| 0.02 * section.focal_sigma_percent);
+        let factors = FOCAL_FACTORS.into_iter();
+        let beyond = factors.filter(move |factor: &f64| factor.ln().abs() > reach);
+        beyond.map(|focal_factor| PoseReading {
             remedy: format!(
                 "a focal length of about {focal_factor} times the given one (unknowns = \
                  [\"focal\"] and focal_sigma_percent = 20 under [calibrate])"
@@ -119,10 +144,35 @@ impl Survey {
             changes: 1,
             focal_factor,
             ..as_given.clone()
-        });
-        let others = poses.chain(pictures).chain(lenses);
-        Ok(std::iter::once(as_given.clone()).chain(others).collect())
+        })
     }
+
+    /// Readings whose poses belong to the frames a few places later or earlier.
+    fn shifted_readings(&self, given: &InterpretedPoses) -> Vec<PoseReading> {
+        let section = &self.file.poses;
+        let wanted = SHIFTS
+            .into_iter()
+            .filter(|_| section.shift_frames.is_none());
+        let reading = |shift_frames: isize| {
+            let path = self.folder.join(&section.initial);
+            // Too few frames, or no way on from the last pose: no such reading.
+            let poses = shifted(given.clone(), shift_frames, &path, &self.frames).ok()?;
+            let remedy = shift_remedy(shift_frames);
+            Some(PoseReading {
+                shift_frames,
+                ..PoseReading::of_poses(remedy, 1, poses.trajectory())
+            })
+        };
+        wanted.filter_map(reading).collect()
+    }
+}
+
+/// Poses of other frames, and the line that reads them so.
+fn shift_remedy(shift_frames: isize) -> String {
+    let count = shift_frames.unsigned_abs();
+    let frames = if count == 1 { "frame" } else { "frames" };
+    let direction = if shift_frames > 0 { "later" } else { "earlier" };
+    format!("the poses {count} {frames} {direction} (shift_frames = {shift_frames} under [poses])")
 }
 
 /// Readings of the file's text other than that of a section: the order of its quaternions and of

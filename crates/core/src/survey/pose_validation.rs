@@ -8,7 +8,7 @@
 //! ([`Survey::pose_readings`](crate::survey::Survey::pose_readings)).
 
 use super::error::SurveyError;
-use super::pose_reader::InterpretedPoses;
+use super::interpreted_poses::InterpretedPoses;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
 use tunnelstitch_geometry::camera::Camera;

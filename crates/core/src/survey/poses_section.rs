@@ -55,6 +55,10 @@ pub struct PosesSection {
     /// True if the file's poses are in the reverse order of the frames.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reversed: Option<bool>,
+    /// Places by which the initial poses, in the order of `reversed`, belong to later frames; if
+    /// negative, to earlier ones. It does not apply to the true poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shift_frames: Option<isize>,
     /// Length of the file's unit of positions, metres; 1 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit_m: Option<f64>,

@@ -72,6 +72,12 @@ impl Discovery {
                  horizontal_fov_deg = {GUESSED_FOV_DEG:?}    # across the frames: a guess"
             ),
         };
+        if let Some(readout_ms) = self.video.as_ref().and_then(|video| video.readout_ms) {
+            let _ = writeln!(
+                text,
+                "readout_ms = {readout_ms}    # rolling shutter, as the video states it"
+            );
+        }
         self.write_frames(&mut text);
         text += "\n[poses]\n";
         self.write_initial_poses(&mut text);

@@ -2,7 +2,7 @@
 
 use super::pose::Pose;
 use super::so3;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
@@ -81,6 +81,19 @@ impl Jitter {
         let volume_deg3: f64 = sigma_rad.map(f64::to_degrees).iter().product();
         let shrink = (MAX_SEARCH_VOLUME_DEG3 / volume_deg3).cbrt().min(1.0);
         sigma_rad.map(|sigma| shrink * sigma)
+    }
+
+    /// Diagonal of the inverse covariance `Σ⁻¹` of rotation and translation.
+    pub fn information(&self) -> Vector6<f64> {
+        let r = self.rotation_sigma_rad.powi(-2);
+        let t = self.translation_sigma_m.map(|s| s.powi(-2));
+        Vector6::new(r, r, r, t[0], t[1], t[2])
+    }
+
+    /// Half the squared Mahalanobis distance of a pose from the expected pose, `½ eᵀΣ⁻¹e`.
+    pub fn deviation_cost(&self, expected: &Pose, pose: &Pose) -> f64 {
+        let e = expected.local(pose);
+        0.5 * e.component_mul(&e).dot(&self.information())
     }
 
     /// Simulates the execution of `plan` with this noise.

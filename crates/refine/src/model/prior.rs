@@ -193,8 +193,7 @@ impl Prior {
 
     /// Half the squared Mahalanobis distance of a pose from the expected pose.
     pub fn deviation_cost(&self, expected: &Pose, pose: &Pose) -> f64 {
-        let e = expected.local(pose);
-        0.5 * e.component_mul(&e).dot(&self.information())
+        self.jitter.deviation_cost(expected, pose)
     }
 
     /// Adds the errors of gain and bias.
@@ -215,19 +214,13 @@ impl Prior {
         0.5 * (gain * estimate.log_gain.powi(2) + bias * estimate.bias.powi(2))
     }
 
-    /// Diagonal of `Σ⁻¹`.
-    fn information(&self) -> Vector6<f64> {
-        let r = self.jitter.rotation_sigma_rad.powi(-2);
-        let t = self.jitter.translation_sigma_m.map(|s| s.powi(-2));
-        Vector6::new(r, r, r, t[0], t[1], t[2])
-    }
-
     /// Adds the error of a pose around its initial value.
     fn add_absolute(&self, k: usize, pose: &Pose, sums: &mut PriorSums) -> f64 {
         let datum = sums.datum;
         let initial = datum.to_tunnel(&self.initial[k]);
         let (e, j) = absolute_error(&initial, pose, datum.scale);
-        let weighted = Matrix6::from_diagonal(&(self.information() / self.variance_ratios[k]));
+        let weighted =
+            Matrix6::from_diagonal(&(self.jitter.information() / self.variance_ratios[k]));
         let slot = k - sums.active.start;
         add_gradient(sums.normal, slot, &(j.transpose() * weighted * e));
         let block = embed(&(j.transpose() * weighted * j));
@@ -244,7 +237,8 @@ impl Prior {
         let datum = sums.datum;
         let [initial_before, initial] = [k - 1, k].map(|k| datum.to_tunnel(&self.initial[k]));
         let (e, j_before, j) = relative_error(&initial_before, &initial, before, pose, datum.scale);
-        let weighted = Matrix6::from_diagonal(&(self.information() / self.step_ratio(k - 1)));
+        let weighted =
+            Matrix6::from_diagonal(&(self.jitter.information() / self.step_ratio(k - 1)));
         let slot = |k: usize| sums.active.contains(&k).then(|| k - sums.active.start);
         let (slot_before, slot) = (slot(k - 1), slot(k));
         for (slot, j) in [(slot_before, &j_before), (slot, &j)] {

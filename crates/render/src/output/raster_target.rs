@@ -265,6 +265,8 @@ fn spec(canvas: &Canvas, format: PixelFormat, layout: Layout, layer: RasterLayer
 
 /// The plane of the unrolled wall: as seen from inside, with chainage to the right.
 const PLANE: &str = "Unrolled wall: x chainage, y arc length";
+/// Names of its axes.
+const AXES: [&str; 2] = ["Chainage", "Arc length"];
 
 /// Georeference of a picture in the plane of the unrolled wall, metres: x is the chainage, y the
 /// arc length. There, y up, the wall is as seen from inside in both layouts: writing is readable.
@@ -274,12 +276,14 @@ pub(crate) fn georeference(canvas: &Canvas, layout: Layout) -> Georeference {
     match layout {
         Layout::ThetaRight => Georeference {
             plane: PLANE,
+            axes: AXES,
             origin_m: [canvas.h_start_m, 0.0],
             column_m: [0.0, step_m],
             row_m: [step_m, 0.0],
         },
         Layout::ChainageRight => Georeference {
             plane: PLANE,
+            axes: AXES,
             origin_m: [canvas.h_start_m, around_m],
             column_m: [step_m, 0.0],
             row_m: [0.0, -step_m],

@@ -30,6 +30,7 @@ pub use baseline::{
     baseline_from_gyro,
 };
 pub use clock_offset::ClockMatch;
+pub use gopro::gopro_readout_ms;
 pub use gravity::{angle_from_gravity_rad, axis_in_camera};
 pub use integration::IntegratedRotation;
 pub use log::{GyroLog, GyroSample, Readout, ReadoutDirection};

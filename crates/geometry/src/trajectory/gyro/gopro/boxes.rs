@@ -51,14 +51,25 @@ impl BoxHeader {
 /// # Errors
 /// No such box; one before it that is damaged.
 pub fn find(content: &[u8], kind: [u8; 4]) -> Result<&[u8], String> {
+    let missing = || {
+        let kind = kind.escape_ascii();
+        format!("its index has no box `{kind}`; it is damaged")
+    };
+    find_if_there(content, kind)?.ok_or_else(missing)
+}
+
+/// The content of the first box of a kind in the content of another, if there is one.
+///
+/// # Errors
+/// A box before it that is damaged.
+pub fn find_if_there(content: &[u8], kind: [u8; 4]) -> Result<Option<&[u8]>, String> {
     for found in Boxes(content) {
         let (found_kind, content) = found?;
         if found_kind == kind {
-            return Ok(content);
+            return Ok(Some(content));
         }
     }
-    let kind = kind.escape_ascii();
-    Err(format!("its index has no box `{kind}`; it is damaged"))
+    Ok(None)
 }
 
 /// Iterator over the boxes in the content of another: kind and content. It ends after an error.

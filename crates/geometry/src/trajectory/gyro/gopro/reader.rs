@@ -2,10 +2,11 @@
 
 use super::sample_table::payloads;
 use super::sensor::{Sensor, SensorKind};
+use super::settings::readout_ms;
 use super::video_file::VideoFile;
 use crate::files::limits::MAX_TABLE_BYTES;
 use crate::trajectory::error::PoseError;
-use crate::trajectory::gyro::log::{GyroLog, GyroSample};
+use crate::trajectory::gyro::log::{GyroLog, GyroSample, Readout, ReadoutDirection};
 use crate::trajectory::gyro::orientation::Orientation;
 use nalgebra::Vector3;
 
@@ -24,9 +25,12 @@ const ACCELEROMETER: SensorKind = SensorKind {
 /// where the axes of one of the two sensors are unknown.
 ///
 /// # Errors
-/// A damaged index; no track `gpmd`, or no `GYRO` in it; damaged payloads; fewer than two samples.
+/// A damaged index; damaged settings; no track `gpmd`, or no `GYRO` in it; damaged payloads; fewer
+/// than two samples.
 pub fn read(mut video: VideoFile) -> Result<GyroLog, PoseError> {
-    let [gyro, accelerometer] = read_sensors(&mut video)?;
+    let index = video.index()?;
+    let readout_ms = readout_ms(&index).map_err(|what| video.error(what))?;
+    let [gyro, accelerometer] = read_sensors(&mut video, &index)?;
     if gyro.values.len() < 2 {
         return Err(video.error(format!(
             "its track `gpmd` has {} values of `GYRO`: this camera wrote no gyro; give a log of \
@@ -51,17 +55,19 @@ pub fn read(mut video: VideoFile) -> Result<GyroLog, PoseError> {
     Ok(GyroLog {
         path: video.path().to_owned(),
         orientation: gyro.axes.map(Orientation::from_matrix),
-        readout: None,
+        readout: readout_ms.map(|time_ms| Readout {
+            time_ms,
+            direction: ReadoutDirection::TopToBottom,
+        }),
         rate_scale: None,
         samples: times_s.into_iter().zip(&gyro.values).map(sample).collect(),
     })
 }
 
-/// Reads gyro and accelerometer from all payloads.
-fn read_sensors(video: &mut VideoFile) -> Result<[Sensor; 2], PoseError> {
-    let index = video.index()?;
+/// Reads gyro and accelerometer from all payloads that `index` names.
+fn read_sensors(video: &mut VideoFile, index: &[u8]) -> Result<[Sensor; 2], PoseError> {
     let max_bytes = video.size().min(MAX_TABLE_BYTES);
-    let payloads = payloads(&index, *b"gpmd", max_bytes).map_err(|what| video.error(what))?;
+    let payloads = payloads(index, *b"gpmd", max_bytes).map_err(|what| video.error(what))?;
     let Some(payloads) = payloads else {
         return Err(video.error(
             "has no track `gpmd`: this camera wrote no gyro; give a log of gcsv, which Gyroflow \

@@ -1,7 +1,8 @@
 //! Videos of a few payloads, written here, and read as a log.
 
+use super::settings::gopro_readout_ms;
 use crate::trajectory::error::PoseError;
-use crate::trajectory::gyro::log::GyroLog;
+use crate::trajectory::gyro::log::{GyroLog, Readout, ReadoutDirection};
 use nalgebra::Vector3;
 
 /// A box of MP4.
@@ -63,6 +64,11 @@ fn payload(
 
 /// A video with these payloads, one a second, in a track of this format.
 fn video(format: &[u8; 4], payloads: &[Vec<u8>]) -> Vec<u8> {
+    video_with(format, payloads, &[])
+}
+
+/// A video whose index begins with other boxes.
+fn video_with(format: &[u8; 4], payloads: &[Vec<u8>], others: &[u8]) -> Vec<u8> {
     let first = mp4_box(b"ftyp", b"mp41");
     let count = payloads.len() as u32;
     let sizes: Vec<u32> = payloads.iter().map(|p| p.len() as u32).collect();
@@ -84,7 +90,7 @@ fn video(format: &[u8; 4], payloads: &[Vec<u8>]) -> Vec<u8> {
     ];
     let track = mp4_box(b"trak", &mp4_box(b"mdia", &media.concat()));
     let data = mp4_box(b"mdat", &payloads.concat());
-    [first, data, mp4_box(b"moov", &track)].concat()
+    [first, data, mp4_box(b"moov", &[others, &track].concat())].concat()
 }
 
 /// Three payloads of four rates and two accelerations: the rate about the first axis counts up.
@@ -93,6 +99,18 @@ fn payloads(device: &str, more: &[u8]) -> Vec<Vec<u8>> {
     let felt = [[4099, 0, 0], [4099, 418, 0]];
     let one = |k: i16| payload(device, more, k as u32, &rates(k), &felt);
     (0..3).map(one).collect()
+}
+
+/// Settings with this value of `SROT`, as those of a HERO11 in the box `udta`.
+fn settings(kind: u8, readout: &[u8]) -> Vec<u8> {
+    let device = [
+        klv(b"DVNM", b'c', 15, b"Global Settings"),
+        klv(b"MINF", b'c', 12, b"HERO11 Black"),
+        klv(b"SROT", kind, readout.len(), readout),
+    ];
+    let settings = klv(b"DEVC", 0, 1, &device.concat());
+    let boxes = [mp4_box(b"FIRM", b"H22.01"), mp4_box(b"GPMF", &settings)];
+    mp4_box(b"udta", &boxes.concat())
 }
 
 fn read(content: &[u8]) -> Result<GyroLog, PoseError> {
@@ -121,6 +139,44 @@ fn rates_accelerations_and_times_of_a_hero5_are_read() {
         [up, left, backwards],
         [-Vector3::y(), -Vector3::x(), -Vector3::z()]
     );
+}
+
+/// A time that a stream states, as a HERO7 does, is not read: it is often wrong.
+#[test]
+fn the_readout_time_is_that_of_the_settings() {
+    let stated = |kind: u8, readout: &[u8]| {
+        let all = payloads("Camera", &klv(b"SROT", b'f', 4, &11.0f32.to_be_bytes()));
+        read(&video_with(b"gpmd", &all, &settings(kind, readout)))
+    };
+    let readout = stated(b'f', &24.0f32.to_be_bytes()).unwrap().readout;
+    let expected = Readout {
+        time_ms: 24.0,
+        direction: ReadoutDirection::TopToBottom,
+    };
+    assert_eq!(readout, Some(expected));
+    for none in [0.0f32, -1.0, f32::NAN, f32::INFINITY] {
+        assert_eq!(stated(b'f', &none.to_be_bytes()).unwrap().readout, None);
+    }
+    let in_stream = klv(b"SROT", b'f', 4, &11.0f32.to_be_bytes());
+    let log = read(&video(b"gpmd", &payloads("Camera", &in_stream))).unwrap();
+    assert_eq!(log.readout, None);
+    let message = stated(b'c', b"slow").unwrap_err().to_string();
+    assert!(
+        message.contains("MP4: its `SROT` has elements"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_file_that_is_no_video_states_no_readout_time() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("GX010001.MP4");
+    assert_eq!(gopro_readout_ms(&path), None);
+    std::fs::write(&path, "GYROFLOW IMU LOG").unwrap();
+    assert_eq!(gopro_readout_ms(&path), None);
+    let settings = settings(b'f', &16.5f32.to_be_bytes());
+    std::fs::write(&path, video_with(b"gpmd", &[], &settings)).unwrap();
+    assert_eq!(gopro_readout_ms(&path), Some(16.5));
 }
 
 #[test]
@@ -207,7 +263,9 @@ fn what_is_wrong_is_named() {
 /// Every byte of the index and of a payload, damaged: an error or another log, and no panic.
 #[test]
 fn damaged_videos_do_no_harm() {
-    let whole = video(b"gpmd", &payloads("Camera", &klv(b"ORIN", b'c', 1, b"ZXY")));
+    let all = payloads("Camera", &klv(b"ORIN", b'c', 1, b"ZXY"));
+    let settings = settings(b'f', &24.0f32.to_be_bytes());
+    let whole = video_with(b"gpmd", &all, &settings);
     for at in 0..whole.len() {
         for value in [0, 0xff] {
             let mut damaged = whole.clone();

@@ -1,0 +1,134 @@
+//! Comparison of a reading with the one given, by pairs of neighbouring frames.
+
+use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
+
+/// The second frames of the pairs; None where a frame does not fit.
+pub type Registrations = Vec<Option<Registered>>;
+
+/// The reading given, with which others are compared.
+pub struct Comparison {
+    /// The pairs in the reading given.
+    pub of_given: Registrations,
+    /// True for pairs that must speak for a reading: those with another step in it than as given.
+    pub telling: Vec<bool>,
+    /// Natural logarithm of the odds that a reading must exceed.
+    pub least_nats: f64,
+    /// Evidence of a pair above which it speaks for a reading, nats.
+    pub min_pair_nats: f64,
+}
+
+impl Comparison {
+    /// Evidence of the first pairs for a reading against the one given by their priors, nats.
+    fn evidence<'a>(&'a self, reading: &'a [Option<Registered>]) -> impl Iterator<Item = f64> + 'a {
+        let pairs = reading.iter().zip(&self.of_given);
+        pairs.map(move |(reading, given)| deviation(given) - deviation(reading))
+    }
+
+    /// Logarithm of the odds of a reading to the one given, by priors and, where a pair fits in
+    /// both, by pixels.
+    pub fn log_odds(&self, reading: &[Option<Registered>]) -> f64 {
+        let of_pixels = |(reading, given): (&Option<Registered>, &Option<Registered>)| {
+            Some((*reading)?.log_likelihood - (*given)?.log_likelihood)
+        };
+        let of_pixels = reading.iter().zip(&self.of_given).filter_map(of_pixels);
+        self.evidence(reading).sum::<f64>() + of_pixels.sum::<f64>()
+    }
+
+    /// True if a reading may be taken whose first pairs are `reading` and in which all others fit
+    /// without any deviation: if its odds by priors suffice, three quarters of the pairs fit, and
+    /// three quarters of those that tell it from the one given speak for it.
+    pub fn may_take(&self, reading: &[Option<Registered>]) -> bool {
+        let left = &self.of_given[reading.len()..];
+        let at_best = left.iter().map(deviation);
+        let evidence: Vec<f64> = self.evidence(reading).chain(at_best).collect();
+        let fitting = reading.iter().flatten().count() + left.len();
+        let telling = evidence
+            .iter()
+            .zip(&self.telling)
+            .filter(|(_, tells)| **tells);
+        let all = telling.clone().count();
+        let for_it = telling
+            .filter(|(nats, _)| **nats > self.min_pair_nats)
+            .count();
+        evidence.iter().sum::<f64>() > self.least_nats
+            && 4 * fitting >= 3 * self.of_given.len()
+            && 4 * for_it >= 3 * all
+    }
+}
+
+/// Deviation of a frame from its prior; one that does not fit deviates by as much as that allows.
+fn deviation(registered: &Option<Registered>) -> f64 {
+    registered.map_or(MAX_DEVIATION_COST, |registered| registered.deviation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::frame_estimate::FrameEstimate;
+    use tunnelstitch_geometry::trajectory::Pose;
+
+    /// A frame that deviates from its prior by so much.
+    fn fits(deviation: f64) -> Option<Registered> {
+        Some(Registered {
+            estimate: FrameEstimate::at(Pose::identity()),
+            is_reliable: true,
+            deviation,
+            log_likelihood: 0.0,
+        })
+    }
+
+    #[test]
+    fn a_reading_is_given_up_once_the_other_pairs_cannot_save_it() {
+        let comparison = Comparison {
+            of_given: vec![fits(3.0); 12],
+            telling: vec![true; 12],
+            least_nats: 9.5,
+            min_pair_nats: 0.0,
+        };
+        assert!(comparison.may_take(&[]));
+        assert!(comparison.may_take(&[fits(1.0); 12]));
+        // Three quarters of the pairs must fit, and speak for it.
+        assert!(comparison.may_take(&[fits(4.0); 3]));
+        assert!(!comparison.may_take(&[fits(4.0); 4]));
+        assert!(!comparison.may_take(&[None; 4]));
+        // A pair that does not fit costs more than the others can make up for here.
+        assert!(!comparison.may_take(&[None]));
+        assert!(!comparison.may_take(&[fits(2.5); 12]));
+    }
+
+    /// Pairs with the same step in both readings must fit, and need not speak for it.
+    #[test]
+    fn pairs_that_tell_nothing_need_only_fit() {
+        let comparison = Comparison {
+            of_given: [[None; 6], [fits(3.0); 6]].concat(),
+            telling: [[true; 6], [false; 6]].concat(),
+            least_nats: 9.5,
+            min_pair_nats: 18.0,
+        };
+        assert!(comparison.may_take(&[fits(3.0); 12]));
+        assert!(comparison.may_take(&[[fits(3.0); 6], [fits(4.0); 6]].concat()));
+        assert!(!comparison.may_take(&[[fits(3.0); 6], [None; 6]].concat()));
+        // Two of six speak against it, by too little to speak for it.
+        assert!(!comparison.may_take(&[fits(20.0), fits(20.0)]));
+    }
+
+    /// Steps that are longer than planned fit a shorter focal length, but the pictures do not.
+    #[test]
+    fn pixels_that_correlate_worse_speak_against_a_reading() {
+        let correlates = |deviation: f64, log_likelihood: f64| {
+            fits(deviation).map(|registered| Registered {
+                log_likelihood,
+                ..registered
+            })
+        };
+        let comparison = Comparison {
+            of_given: vec![correlates(3.0, 40.0), correlates(3.0, 40.0), None],
+            telling: vec![true; 3],
+            least_nats: 3.0,
+            min_pair_nats: 0.0,
+        };
+        let odds = |of_pixels: f64| comparison.log_odds(&[correlates(1.0, of_pixels); 3]);
+        assert_eq!(odds(40.0), 4.0 + MAX_DEVIATION_COST - 1.0);
+        assert_eq!(odds(30.0), odds(40.0) - 20.0);
+    }
+}

@@ -1,0 +1,192 @@
+//! The search: all readings against the one given.
+
+use super::comparison::Comparison;
+use super::finding::FittingReadings;
+use super::picture_pairs::PicturePairs;
+use super::telling_pairs::{TellingPair, telling_pairs};
+use crate::error::RefineError;
+use crate::options::RefineOptions;
+use crate::tracking::neighbour_pairs::first_frames;
+use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
+use tunnelstitch_core::survey::{PoseReading, Survey, SurveyError};
+
+/// Smallest number of pairs: fewer may fit by chance.
+const MIN_PAIRS: usize = 4;
+/// Evidence below that of the best reading with which another is named beside it, nats: odds of one
+/// to twenty.
+const MAX_DEFICIT_NATS: f64 = 3.0;
+/// Evidence of a pair that speaks for poses of other frames, nats: half of that by which its steps
+/// differ at least.
+const MIN_SHIFT_NATS: f64 = 0.5 * MAX_DEVIATION_COST;
+
+/// A survey whose readings cannot be searched.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadingSearchError {
+    /// The poses cannot be read in all readings.
+    #[error(transparent)]
+    Survey(#[from] SurveyError),
+    /// A frame cannot be read, or the input is none to refine.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+}
+
+/// A reading that neighbouring frames agree with.
+struct Found<'r> {
+    reading: &'r PoseReading,
+    /// Pairs that fit in it, pairs that fit as given, and all pairs.
+    fitting: usize,
+    given: usize,
+    pairs: usize,
+    /// Natural logarithm of its odds to the reading given.
+    log_odds: f64,
+}
+
+/// Looks for readings that neighbouring frames agree with; None if they do with the one given, or
+/// with no other.
+///
+/// A frame is registered on the wall that the one before it shows, as tracking does, from the
+/// reading's pose and within its prior. Where it is found in both readings, the evidence against
+/// the one given is by how much less the frame deviates from the prior, `½ eᵀΣ⁻¹e`, and by how much
+/// better it correlates, which it does with another focal length alone. A reading is taken if three
+/// quarters of the pairs fit and speak for it, and its odds exceed the number of readings over the survey's rate of false alarms. There may be several:
+/// poses exactly as planned, seen from the tunnel's other end, are those of another convention.
+///
+/// Poses of other frames are compared by the pairs that tell them ([`telling_pairs`]), all other
+/// readings by pairs that are evenly distributed.
+///
+/// # Errors
+/// [`ReadingSearchError`].
+pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, ReadingSearchError> {
+    let readings = survey.pose_readings()?;
+    let least_nats = (readings.len() as f64 / RefineOptions::default().false_alarm_rate).ln();
+    let Some((given, others)) = readings.split_first() else {
+        return Ok(None);
+    };
+    let is_shifted = |reading: &&PoseReading| reading.shift_frames != 0;
+    let (shifted, others): (Vec<_>, Vec<_>) = others.iter().partition(is_shifted);
+    let mut found = among_all_pairs(survey, given, &others, least_nats)?;
+    found.extend(among_telling_pairs(survey, given, &shifted, least_nats)?);
+    Ok(name(found))
+}
+
+/// Readings that evenly distributed pairs agree with.
+fn among_all_pairs<'r>(
+    survey: &Survey,
+    given: &PoseReading,
+    others: &[&'r PoseReading],
+    least_nats: f64,
+) -> Result<Vec<Found<'r>>, RefineError> {
+    let firsts = first_frames(survey.frames.len());
+    if firsts.len() < MIN_PAIRS {
+        return Ok(Vec::new());
+    }
+    let pictures = PicturePairs::load(survey, &firsts)?;
+    let comparison = Comparison {
+        of_given: pictures.register(given, &firsts, |_| true)?,
+        telling: vec![true; firsts.len()],
+        least_nats,
+        min_pair_nats: 0.0,
+    };
+    let mut found = Vec::new();
+    for reading in others {
+        found.extend(compare(&pictures, &firsts, &comparison, reading)?);
+    }
+    Ok(found)
+}
+
+/// Readings with poses of other frames that the pairs which tell them agree with.
+fn among_telling_pairs<'r>(
+    survey: &Survey,
+    given: &PoseReading,
+    shifted: &[&'r PoseReading],
+    least_nats: f64,
+) -> Result<Vec<Found<'r>>, RefineError> {
+    let telling = telling_pairs(&survey.prior, given, shifted);
+    if telling.len() < MIN_PAIRS {
+        return Ok(Vec::new());
+    }
+    let firsts: Vec<usize> = telling.iter().map(|pair| pair.first).collect();
+    let pictures = PicturePairs::load(survey, &firsts)?;
+    let compared =
+        |k: usize, of_given: &[Option<Registered>]| compared(&telling, k, of_given, least_nats);
+    // Pairs that are still to be registered may not fit as given.
+    let may_take_any = |some: &[Option<Registered>]| {
+        let mut all = (0..shifted.len()).filter_map(|k| compared(k, some));
+        all.any(|comparison| comparison.may_take(&[]))
+    };
+    let of_given = pictures.register(given, &firsts, may_take_any)?;
+    if !may_take_any(&of_given) {
+        return Ok(Vec::new());
+    }
+    let mut found = Vec::new();
+    for (k, reading) in shifted.iter().enumerate() {
+        if let Some(comparison) = compared(k, &of_given) {
+            found.extend(compare(&pictures, &firsts, &comparison, reading)?);
+        }
+    }
+    Ok(found)
+}
+
+/// The comparison with reading `k`, in which pairs beyond the end of `of_given` do not fit as
+/// given; None if too few pairs tell it from that.
+fn compared(
+    telling: &[TellingPair],
+    k: usize,
+    of_given: &[Option<Registered>],
+    least_nats: f64,
+) -> Option<Comparison> {
+    let mut of_given = of_given.to_vec();
+    of_given.resize(telling.len(), None);
+    let tells: Vec<bool> = telling
+        .iter()
+        .map(|pair| pair.readings.contains(&k))
+        .collect();
+    let is_enough = tells.iter().filter(|tells| **tells).count() >= MIN_PAIRS;
+    is_enough.then_some(Comparison {
+        of_given,
+        telling: tells,
+        least_nats,
+        min_pair_nats: MIN_SHIFT_NATS,
+    })
+}
+
+/// Compares a reading with the one given by the frames after `firsts`; None if it is not taken.
+fn compare<'r>(
+    pictures: &PicturePairs,
+    firsts: &[usize],
+    comparison: &Comparison,
+    reading: &'r PoseReading,
+) -> Result<Option<Found<'r>>, RefineError> {
+    if !comparison.may_take(&[]) {
+        return Ok(None);
+    }
+    let registered = pictures.register(reading, firsts, |some| comparison.may_take(some))?;
+    let log_odds = comparison.log_odds(&registered);
+    let is_taken = comparison.may_take(&registered) && log_odds > comparison.least_nats;
+    Ok(is_taken.then(|| Found {
+        reading,
+        fitting: registered.iter().flatten().count(),
+        given: comparison.of_given.iter().flatten().count(),
+        pairs: firsts.len(),
+        log_odds,
+    }))
+}
+
+/// The readings found, the most probable first, without those that are far less so.
+fn name(mut found: Vec<Found>) -> Option<FittingReadings> {
+    found.sort_by(|a, b| {
+        let by_odds = b.log_odds.total_cmp(&a.log_odds);
+        by_odds.then(a.reading.changes.cmp(&b.reading.changes))
+    });
+    let best = found.first()?;
+    let named = found
+        .iter()
+        .filter(|one| best.log_odds - one.log_odds <= MAX_DEFICIT_NATS);
+    Some(FittingReadings {
+        readings: named.map(|one| one.reading.remedy.clone()).collect(),
+        fitting: best.fitting,
+        given: best.given,
+        pairs: best.pairs,
+        log_odds: best.log_odds,
+    })
+}
