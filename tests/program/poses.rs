@@ -1,6 +1,6 @@
 //! Poses in other formats and conventions, through the program.
 
-use crate::support::{self, edit, fail, first_frames, succeed, text};
+use crate::support::{self, edit, fail, first_frames, simulate, succeed, text};
 use std::path::{Path, PathBuf};
 use tunnelstitch::trajectory::{
     CameraAxes, Pose, StampedPose, Trajectory, TunnelAxis, poses_of, se3, so3, tum,
@@ -537,8 +537,9 @@ fn what_only_pictures_can_tell_is_named_by_refine() {
 /// and has nothing to say with that line.
 #[test]
 fn what_only_pictures_can_tell_is_named_by_check() {
-    let survey = first_frames(10);
-    let dir = survey.path();
+    let scratch = tempfile::tempdir().unwrap();
+    let dir = &scratch.path().join("survey");
+    simulate(dir, &["--frames", "10", "--size", "240x180"]);
     let (toml, path) = (dir.join("survey.toml"), dir.join("baseline.tum"));
     let planned = tum::read(&path).unwrap();
     let right = std::fs::read_to_string(&toml).unwrap();

@@ -359,11 +359,9 @@ fn next_length(curvature: f64) -> f64 {
 /// Source: J. Nocedal and S. J. Wright, "Numerical Optimization", 2006, chapter 10 (Gauss–Newton
 /// converges linearly where residuals are left).
 fn share_left(before: Option<f64>, decrement: f64) -> f64 {
-    let ratio = before.map_or(1.0, |before| (decrement / before).sqrt());
-    if ratio < 0.5 {
-        ratio / (1.0 - ratio)
-    } else {
-        1.0
+    match before.map(|before| (decrement / before).sqrt()) {
+        Some(ratio) if ratio < 1.0 => (ratio / (1.0 - ratio)).min(1.0),
+        _ => 1.0,
     }
 }
 

@@ -19,8 +19,9 @@ use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
 use tunnelstitch_core::progress::Progress;
 
 /// Distance between the logarithms of neighbouring focal lengths: half of it moves the border of a
-/// picture by a pixel or two of the level at which frames are searched for.
-const STEP: f64 = 0.04;
+/// picture by a pixel or two of the level at which frames are searched for, and tracking corrects
+/// as much.
+const STEP: f64 = 0.05;
 /// Reach of the search, 1-σ of the prior.
 const REACH_SIGMAS: f64 = 2.0;
 
@@ -73,4 +74,57 @@ fn log_posterior(registered: &Option<Registered>) -> f64 {
     registered.map_or(-MAX_DEVIATION_COST, |registered| {
         registered.log_likelihood - registered.deviation
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::calibration::Calibration;
+    use crate::test_scene::{bricks, with_context};
+    use tunnelstitch_core::progress::Silent;
+    use tunnelstitch_core::test_wall::TestWall;
+    use tunnelstitch_geometry::camera::Camera;
+
+    /// κ₀ that is found where the given focal length is `factor` times the true one, with a prior of
+    /// `sigma`.
+    fn found(factor: f64, sigma: f64) -> f64 {
+        let wall = TestWall::ring(bricks);
+        let (mut pictures, poses) = (wall.frames(), &wall.poses[..6]);
+        pictures.truncate(poses.len());
+        with_context(&wall, pictures, poses, |context, states| {
+            let given = Camera {
+                fx: factor * context.camera.fx,
+                fy: factor * context.camera.fy,
+                ..context.camera
+            };
+            let mut calibration = Calibration::none(&given);
+            calibration.free[FOCAL_INDEX] = true;
+            calibration.sigma[FOCAL_INDEX] = sigma;
+            let context = EstimationContext {
+                camera: given,
+                calibration,
+                ..context.clone()
+            };
+            let options = RefineOptions {
+                // The pyramids have one level.
+                coarsest_side: given.shorter_side(),
+                ..RefineOptions::default()
+            };
+            search_focal_length(&context, &options, &states.rejections, &Silent).unwrap()
+                [FOCAL_INDEX]
+        })
+    }
+
+    #[test]
+    fn the_nearest_focal_length_tried_is_found() {
+        for factor in [0.78f64, 1.3] {
+            let left = found(factor, 0.15) + factor.ln();
+            assert!(left.abs() <= STEP, "{factor}: {left}");
+        }
+    }
+
+    #[test]
+    fn a_focal_length_known_to_a_few_per_cent_is_not_searched_for() {
+        assert_eq!(found(1.3, 0.02), 0.0);
+    }
 }

@@ -12,7 +12,7 @@ use crate::tracking::registration::{Effort, Registered, register_frame};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Largest number of pairs of neighbouring frames that are looked at: bounds the time.
-pub const MAX_PAIRS: usize = 12;
+const MAX_PAIRS: usize = 12;
 /// Pairs that are registered at once; after each batch a hypothesis that cannot win any more is
 /// given up.
 const PAIRS_AT_ONCE: usize = 4;
