@@ -48,8 +48,9 @@ struct Found<'r> {
 /// reading's pose and within its prior. Where it is found in both readings, the evidence against
 /// the one given is by how much less the frame deviates from the prior, `½ eᵀΣ⁻¹e`, and by how much
 /// better it correlates, which it does with another focal length alone. A reading is taken if three
-/// quarters of the pairs fit and speak for it, and its odds exceed the number of readings over the survey's rate of false alarms. There may be several:
-/// poses exactly as planned, seen from the tunnel's other end, are those of another convention.
+/// quarters of the pairs fit and speak for it, and its odds exceed the number of readings over the
+/// survey's rate of false alarms. There may be several: poses exactly as planned, seen from the
+/// tunnel's other end, are those of another convention.
 ///
 /// Poses of other frames are compared by the pairs that tell them ([`telling_pairs`]), all other
 /// readings by pairs that are evenly distributed.
