@@ -74,8 +74,9 @@ fn a_wrong_focal_length_is_found_and_the_result_is_a_survey() {
     succeed(&[&arguments[..], &more, &["--px-per-metre", "40"]].concat());
 }
 
-/// Pictures and poses without a calibration: `init` guesses a camera, `refine` finds its focal length
-/// and distortion. With a calibration that is as wrong, `check` names the line that asks for that.
+/// Pictures and poses without a calibration: `init` guesses a camera, `refine` finds its focal
+/// length and distortion. With a calibration that is as wrong, `check` names the line that asks for
+/// that.
 #[test]
 fn a_survey_without_calibration_is_refined() {
     let dir = tempfile::tempdir().unwrap();

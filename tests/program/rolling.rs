@@ -49,7 +49,7 @@ fn rows_get_their_own_poses_and_where_they_do_not_the_program_says_so() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     let (survey, out, compared) = (path("survey"), path("out"), path("compared"));
-    simulate(&survey, &["--readout-ms", "20"]);
+    simulate(&survey, &["--readout-ms", "20", "--supersample", "8"]);
 
     let (rows, warned) = refine(&survey, &out);
     assert!(!warned.contains(WARNING), "{warned}");

@@ -36,8 +36,8 @@ impl DeformationErrors {
     }
 }
 
-/// The errors of an estimated shape at its nodes; `gauge`: the motion from the estimated to the true
-/// poses.
+/// The errors of an estimated shape at its nodes; `gauge`: the motion from the estimated to the
+/// true poses.
 pub(super) fn errors_of(
     shape: &EstimatedShape,
     survey: &Survey,

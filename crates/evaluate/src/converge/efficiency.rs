@@ -278,8 +278,8 @@ impl RefinedSurvey {
 
 /// Simulates and refines one survey, and computes its errors and bounds.
 ///
-/// The bounds are those of a wall as drawn whose deformation is unknown: a few millimetres change no
-/// slope.
+/// The bounds are those of a wall as drawn whose deformation is unknown: a few millimetres change
+/// no slope.
 fn refine_survey(
     options: &SimulateOptions,
     sweep: &ConvergeOptions,

@@ -49,7 +49,7 @@ impl WallDeformation {
         self.ovality_mm > 0.0 || self.undulation_mm > 0.0
     }
 
-    /// What is known of such a wall before any frame is seen.
+    /// Prior knowledge of such a wall, before any frame is seen.
     pub(super) fn prior(&self) -> WallPrior {
         WallPrior {
             ovality_m: 1e-3 * self.ovality_mm,

@@ -45,8 +45,8 @@ pub struct AlternatingCalibration {
 }
 
 impl AlternatingCalibration {
-    /// Tracking that has not begun, with the shared parameters `kappa`; `rejections`: of frames that
-    /// prescreening has rejected.
+    /// Tracking that has not begun, with the shared parameters `kappa`; `rejections`: of frames
+    /// that prescreening has rejected.
     pub fn new(rejections: Vec<Option<RejectionReason>>, kappa: Kappa) -> Self {
         Self {
             round: 0,

@@ -1,10 +1,10 @@
 //! Search for a focal length that is hardly known.
 //!
-//! Tracking and Gauss–Newton correct a focal length that is wrong by a few per cent. Where its prior
-//! is wider, focal lengths are tried over the whole of it: with each, the second frames of some
-//! pairs of neighbours are registered on the wall that the first ones show. A wrong focal length
-//! turns them by too much or too little against the prior of the poses, and bends what they show, so
-//! that it correlates less. The log-posterior of κ₀ = ln f is the sum over the pairs of
+//! Tracking and Gauss–Newton correct a focal length that is wrong by a few per cent. Where its
+//! prior is wider, focal lengths are tried over the whole of it: with each, the second frames of
+//! some pairs of neighbours are registered on the wall that the first ones show. A wrong focal
+//! length turns them by too much or too little against the prior of the poses, and bends what they
+//! show, so that it correlates less. The log-posterior of κ₀ = ln f is the sum over the pairs of
 //! log-likelihood and prior.
 
 use crate::model::context::EstimationContext;
@@ -25,8 +25,9 @@ const STEP: f64 = 0.05;
 /// Reach of the search, 1-σ of the prior.
 const REACH_SIGMAS: f64 = 2.0;
 
-/// Shared parameters with which tracking begins: zero but for the logarithm of the focal length over
-/// the given one, if it is asked for and its prior reaches farther than tracking does by itself.
+/// Shared parameters with which tracking begins: zero but for the logarithm of the focal length
+/// over the given one, if it is asked for and its prior reaches farther than tracking does by
+/// itself.
 /// `rejections`: of frames that show nothing.
 ///
 /// # Errors
@@ -85,8 +86,8 @@ mod tests {
     use tunnelstitch_core::test_wall::TestWall;
     use tunnelstitch_geometry::camera::Camera;
 
-    /// κ₀ that is found where the given focal length is `factor` times the true one, with a prior of
-    /// `sigma`.
+    /// κ₀ that is found where the given focal length is `factor` times the true one, with a prior
+    /// of `sigma`.
     fn found(factor: f64, sigma: f64) -> f64 {
         let wall = TestWall::ring(bricks);
         let (mut pictures, poses) = (wall.frames(), &wall.poses[..6]);

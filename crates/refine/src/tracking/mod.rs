@@ -9,9 +9,9 @@
 //! Tracking registers one frame after another: the prior predicts a pose, the correlation search
 //! compares the unwrapped frame with a reference mosaic of its neighbours, and the hypotheses are
 //! refined and chosen from. Sliding windows keep the error bounded. While shading or camera are
-//! only roughly known, tracking alternates with their calibration. A focal length that is hardly known
-//! is searched for before, by pairs of neighbours ([`focal_search`]). [`lamp_search`] finds a lamp
-//! once poses are good.
+//! only roughly known, tracking alternates with their calibration. A focal length that is hardly
+//! known is searched for before, by pairs of neighbours ([`focal_search`]). [`lamp_search`] finds a
+//! lamp once poses are good.
 
 pub mod alternating_calibration;
 pub mod candidate;

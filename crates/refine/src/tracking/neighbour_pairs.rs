@@ -1,5 +1,5 @@
-//! Registration of pairs of neighbouring frames, by which hypotheses about the whole survey are told
-//! apart: of how its poses are to be read, of its focal length.
+//! Registration of pairs of neighbouring frames, by which hypotheses about the whole survey are
+//! told apart: of how its poses are to be read, of its focal length.
 
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;

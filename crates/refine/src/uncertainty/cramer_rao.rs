@@ -185,8 +185,8 @@ pub fn pose_bounds(
     })
 }
 
-/// Subtracts the prior of the poses of `count` frames from the normal equations; exposures and shape
-/// keep theirs.
+/// Subtracts the prior of the poses of `count` frames from the normal equations; exposures and
+/// shape keep theirs.
 fn subtract_pose_prior(
     pattern: &Pattern,
     prior: &[Block],
