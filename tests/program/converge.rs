@@ -57,7 +57,7 @@ fn the_efficiency_is_measured_against_the_bound() {
 fn the_efficiency_on_a_deformed_wall_covers_its_deformation() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("walls");
-    let options = "--efficiency --frames 30 --size 160x120 --seeds 1 --quiet --ovality-mm 10 \
+    let options = "--efficiency --frames 24 --size 160x120 --seeds 1 --quiet --ovality-mm 10 \
                    --undulation-mm 4 --undulation-length-m 1";
     let mut arguments = vec!["converge", "--out", text(&out)];
     arguments.extend(options.split(' '));
