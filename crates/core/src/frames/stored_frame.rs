@@ -170,8 +170,8 @@ mod tests {
         }
     }
 
-    /// Against the general conversion, over the cube of colours: its weights, of more digits, make a
-    /// hundredth of a grey level at the most.
+    /// Against the general conversion, over the cube of colours: its weights, of more digits, make
+    /// a hundredth of a grey level at the most.
     #[test]
     fn luma_of_eight_bits_is_that_of_the_general_conversion() {
         let colours = image::RgbImage::from_fn(52, 52, |x, y| {

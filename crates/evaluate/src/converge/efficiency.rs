@@ -6,6 +6,7 @@ use crate::converge::error::ConvergeError;
 use crate::converge::feasible_survey::draw_survey;
 use crate::converge::options::ConvergeOptions;
 use crate::converge::sweep_cell::SweepCell;
+use crate::converge::wall_deformation::WallDeformation;
 use crate::deformation::NodeError;
 use crate::normalised_errors::{first_pose_gauge, gauge_fixed_errors, normalised_errors_squared};
 use nalgebra::{Matrix6, Vector6};
@@ -187,7 +188,7 @@ pub fn measure_efficiency(
                 progress.advance(1);
                 continue;
             };
-            let run = refine_survey(&survey, options, joint, out)?;
+            let run = refine_survey(&survey, &options.deformation, joint, out)?;
             surveys += 1;
             nodes.extend_from_slice(&run.nodes);
             factors += run.stated.variance_factor;
@@ -282,7 +283,7 @@ impl RefinedSurvey {
 /// no slope.
 fn refine_survey(
     options: &SimulateOptions,
-    sweep: &ConvergeOptions,
+    deformation: &WallDeformation,
     joint: bool,
     out: &Path,
 ) -> Result<RefinedSurvey, ConvergeError> {
@@ -307,13 +308,13 @@ fn refine_survey(
     let poses = poses_of(&refined.trajectory);
     let errors = gauge_fixed_errors(survey.surface.as_ref(), &poses, &truth)?;
     let nodes = match &refined.shape {
-        Some(shape) if sweep.deformation.is_any() => {
+        Some(shape) if deformation.is_any() => {
             let gauge = first_pose_gauge(survey.surface.as_ref(), &poses, &truth)?;
             errors_of(shape, &survey, &Scene::new(options)?, &gauge)
         }
         _ => Vec::new(),
     };
-    let wall = sweep.deformation.prior();
+    let wall = deformation.prior();
     Ok(RefinedSurvey {
         bounds: pose_bounds(&survey, &fine, noise, &texture, &wall)?,
         stated: refined.covariances,

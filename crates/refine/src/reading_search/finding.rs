@@ -35,7 +35,7 @@ impl FittingReadings {
             format!("odds of more than 10^{MAX_ODDS_POWER:.0} to 1")
         };
         format!(
-            "the frames do not agree with poses and pictures as they are read ({given} of {pairs} \
+            "the frames do not agree with poses, pictures and camera as given ({given} of {pairs} \
              neighbours fit each other); they agree ({fitting} of {pairs}, {odds}) with {}",
             readings.join(", or with ")
         )
