@@ -78,6 +78,11 @@ impl PoseReading {
         }
     }
 
+    /// True if the reading has another focal length than given.
+    pub fn changes_lens(&self) -> bool {
+        self.focal_factor != 1.0
+    }
+
     /// True if the reading has a pose of the file for frame `k`.
     pub fn has_pose_of(&self, k: usize) -> bool {
         let own = k.checked_add_signed(-self.shift_frames);

@@ -24,13 +24,17 @@ impl Comparison {
         pairs.map(move |(reading, given)| deviation(given) - deviation(reading))
     }
 
-    /// Logarithm of the odds of a reading to the one given, by priors and, where a pair fits in
-    /// both, by pixels.
-    pub fn log_odds(&self, reading: &[Option<Registered>]) -> f64 {
+    /// Logarithm of the odds of a reading to the one given, by priors alone, or by pixels, too,
+    /// where a pair fits in both.
+    ///
+    /// Only another focal length makes pairs correlate better or worse than as given. In all other
+    /// readings they differ by chance, which tells nothing.
+    pub fn log_odds(&self, reading: &[Option<Registered>], by_pixels: bool) -> f64 {
         let of_pixels = |(reading, given): (&Option<Registered>, &Option<Registered>)| {
             Some((*reading)?.log_likelihood - (*given)?.log_likelihood)
         };
-        let of_pixels = reading.iter().zip(&self.of_given).filter_map(of_pixels);
+        let pairs = reading.iter().zip(&self.of_given);
+        let of_pixels = pairs.filter(|_| by_pixels).filter_map(of_pixels);
         self.evidence(reading).sum::<f64>() + of_pixels.sum::<f64>()
     }
 
@@ -127,8 +131,10 @@ mod tests {
             least_nats: 3.0,
             min_pair_nats: 0.0,
         };
-        let odds = |of_pixels: f64| comparison.log_odds(&[correlates(1.0, of_pixels); 3]);
-        assert_eq!(odds(40.0), 4.0 + MAX_DEVIATION_COST - 1.0);
-        assert_eq!(odds(30.0), odds(40.0) - 20.0);
+        let odds = |of_pixels: f64| comparison.log_odds(&[correlates(1.0, of_pixels); 3], true);
+        let by_priors = comparison.log_odds(&[correlates(1.0, 0.0); 3], false);
+        assert_eq!(by_priors, 4.0 + MAX_DEVIATION_COST - 1.0);
+        assert_eq!(odds(40.0), by_priors);
+        assert_eq!(odds(30.0), by_priors - 20.0);
     }
 }

@@ -46,8 +46,8 @@ struct Found<'r> {
 ///
 /// A frame is registered on the wall that the one before it shows, as tracking does, from the
 /// reading's pose and within its prior. Where it is found in both readings, the evidence against
-/// the one given is by how much less the frame deviates from the prior, `½ eᵀΣ⁻¹e`, and by how much
-/// better it correlates, which it does with another focal length alone. A reading is taken if three
+/// the one given is by how much less the frame deviates from the prior, `½ eᵀΣ⁻¹e`, and, with
+/// another focal length, by how much better it correlates. A reading is taken if three
 /// quarters of the pairs fit and speak for it, and its odds exceed the number of readings over the
 /// survey's rate of false alarms. There may be several: poses exactly as planned, seen from the
 /// tunnel's other end, are those of another convention.
@@ -162,7 +162,7 @@ fn compare<'r>(
         return Ok(None);
     }
     let registered = pictures.register(reading, firsts, |some| comparison.may_take(some))?;
-    let log_odds = comparison.log_odds(&registered);
+    let log_odds = comparison.log_odds(&registered, reading.changes_lens());
     let is_taken = comparison.may_take(&registered) && log_odds > comparison.least_nats;
     Ok(is_taken.then(|| Found {
         reading,
