@@ -4,7 +4,6 @@ use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::prior::Prior;
 use crate::parameters::calibration::{Calibration, Kappa};
-use crate::parameters::frame_estimate::FrameEstimate;
 use crate::samples::visibility::PosedFrame;
 use crate::tiles::grid::WallGrid;
 use std::sync::LazyLock;
@@ -118,11 +117,7 @@ pub fn test_context<'a>(
 
 /// States of frames at these poses, all inliers.
 pub fn frame_states(poses: &[Pose]) -> FrameStates {
-    FrameStates {
-        estimates: poses.iter().map(|pose| FrameEstimate::at(*pose)).collect(),
-        rejections: vec![None; poses.len()],
-        kappa: Kappa::zeros(),
-    }
+    FrameStates::at(poses, vec![None; poses.len()])
 }
 
 /// A tunnel of 3 m radius, a camera, the lattice of its pixels, and a spiral of `frames` frames,

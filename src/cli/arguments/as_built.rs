@@ -72,9 +72,6 @@ impl AsBuiltArguments {
     pub fn add_to(&self, options: SimulateOptions) -> SimulateOptions {
         SimulateOptions {
             as_built: AsBuilt {
-                ovality_mm: self.deformation.ovality_mm,
-                undulation_mm: self.deformation.undulation_mm,
-                undulation_length_m: self.deformation.undulation_length_m,
                 segments: self.segments.map(|count| Segments {
                     count,
                     ring_length_m: self.ring_length_m,
@@ -82,6 +79,7 @@ impl AsBuiltArguments {
                     joint_mm: self.joint_mm,
                 }),
                 shape_file: self.shape_file.clone(),
+                ..self.deformation.deformation().as_built()
             },
             fittings: Fittings {
                 cables: self.cables,

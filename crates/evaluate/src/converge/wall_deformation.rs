@@ -35,7 +35,7 @@ impl Default for WallDeformation {
 
 impl WallDeformation {
     /// The lining to be simulated.
-    pub(super) fn as_built(&self) -> AsBuilt {
+    pub fn as_built(&self) -> AsBuilt {
         AsBuilt {
             ovality_mm: self.ovality_mm,
             undulation_mm: self.undulation_mm,

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::ops::Range;
 use tunnelstitch_geometry::camera::Sweep;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// The states of all frames, and the shared parameters.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -21,6 +22,15 @@ pub struct FrameStates {
 }
 
 impl FrameStates {
+    /// Frames at these poses, with exposures and shared parameters as given.
+    pub fn at(poses: &[Pose], rejections: Vec<Option<RejectionReason>>) -> Self {
+        Self {
+            estimates: poses.iter().map(|pose| FrameEstimate::at(*pose)).collect(),
+            rejections,
+            kappa: Kappa::zeros(),
+        }
+    }
+
     /// The window of all frames, all estimated; rejected frames from the prior alone.
     pub fn window(&self) -> FrameWindow<'_> {
         let all = 0..self.estimates.len();

@@ -5,6 +5,7 @@ use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::model::prior_terms::{
     DatumJacobian, absolute_error, absolute_error_by_datum, relative_error, relative_error_by_datum,
 };
+use crate::options::RefineOptions;
 use crate::parameters::calibration::{DATUM_PARAMETERS, Datum, INTRINSIC_PARAMETERS};
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -12,7 +13,7 @@ use std::ops::Range;
 use tunnelstitch_core::survey::PoseGap;
 use tunnelstitch_geometry::numerics::median::upper_median;
 use tunnelstitch_geometry::surface::{Gauge, GaugeMotion};
-use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose};
+use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose, StampedPose, poses_of};
 
 /// Gaussian prior on poses and exposures.
 ///
@@ -40,7 +41,7 @@ pub struct Prior {
     /// Median step between these times, seconds.
     pub median_step_s: f64,
     /// Factors of the variance of each initial pose: 1 if it was given, more if it was interpolated
-    /// ([`variance_ratios`]).
+    /// (the steps of its gap).
     pub variance_ratios: Vec<f64>,
     /// 1-σ of the log-gain.
     pub log_gain_sigma: f64,
@@ -48,15 +49,36 @@ pub struct Prior {
     pub bias_sigma: f64,
 }
 
+impl Prior {
+    /// The prior of initial poses with this noise, some of them interpolated, and of exposures.
+    pub fn new(
+        jitter: Jitter,
+        initial: &[StampedPose],
+        gaps: &[PoseGap],
+        options: &RefineOptions,
+    ) -> Self {
+        let times_s: Vec<f64> = initial.iter().map(|stamped| stamped.time_s).collect();
+        Self {
+            jitter,
+            initial: poses_of(initial),
+            median_step_s: median_step_s(&times_s),
+            variance_ratios: variance_ratios(initial.len(), gaps),
+            times_s,
+            log_gain_sigma: options.log_gain_sigma,
+            bias_sigma: options.bias_sigma,
+        }
+    }
+}
+
 /// Median step between times, seconds; 1 for fewer than two times.
-pub fn median_step_s(times_s: &[f64]) -> f64 {
+fn median_step_s(times_s: &[f64]) -> f64 {
     let steps = times_s.windows(2).map(|t| t[1] - t[0]);
     upper_median(steps.collect()).unwrap_or(1.0)
 }
 
 /// Factors of the variance of the initial poses of `count` frames: 1, but the steps of the gap for
 /// frames whose poses were interpolated.
-pub fn variance_ratios(count: usize, gaps: &[PoseGap]) -> Vec<f64> {
+fn variance_ratios(count: usize, gaps: &[PoseGap]) -> Vec<f64> {
     let mut ratios = vec![1.0; count];
     for gap in gaps {
         for ratio in ratios

@@ -42,6 +42,7 @@ impl WallPrior {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parameters::shape::FunctionValue;
     use std::f64::consts::TAU;
 
     /// Variance and correlation of the undulation are those of the field.
@@ -57,7 +58,7 @@ mod tests {
         let at = |s_m: f64| model.functions_at(WallPoint { s_m, h_m: 6.1 });
         let covariance = |a: f64, b: f64| -> f64 {
             let (a, b) = (at(a), at(b));
-            let same = |of: &crate::parameters::shape::FunctionValue| {
+            let same = |of: &FunctionValue| {
                 let mut others = b.iter();
                 let other = others.find(|b| (b.block, b.component) == (of.block, of.component));
                 other.map_or(0.0, |other| {

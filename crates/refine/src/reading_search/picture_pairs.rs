@@ -6,8 +6,6 @@ use crate::input::RefineInput;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
-use crate::parameters::calibration::Kappa;
-use crate::parameters::frame_estimate::FrameEstimate;
 use crate::stages::setup::Setup;
 use crate::tracking::neighbour_pairs::register_pairs;
 use crate::tracking::prescreening::prescreen;
@@ -85,12 +83,7 @@ impl<'s> PicturePairs<'s> {
             .collect();
         let prescreened = prescreen(&setup.initial_context(0.0), setup.coarsest_level(), &Silent)?;
         let context = setup.initial_context(prescreened.noise);
-        let initial = setup.prior.initial.iter();
-        let states = FrameStates {
-            estimates: initial.map(|pose| FrameEstimate::at(*pose)).collect(),
-            rejections: prescreened.rejections,
-            kappa: Kappa::zeros(),
-        };
+        let states = FrameStates::at(&setup.prior.initial, prescreened.rejections);
         Ok(register_pairs(
             &context, &options, &states, &firsts, is_wanted,
         )?)

@@ -5,13 +5,12 @@ use crate::error::RefineError;
 use crate::input::{RefineInput, is_motionless};
 use crate::model::context::{EstimationContext, total_displacement};
 use crate::model::frame_states::FrameStates;
-use crate::model::prior::{Prior, median_step_s, variance_ratios};
+use crate::model::prior::Prior;
 use crate::options::{RefineOptions, ShapeMode};
 use crate::parameters::calibration::{
     BEND_INDEX, BEND_PARAMETERS, Calibration, DATUM_PARAMETERS, INTRINSIC_PARAMETERS, Kappa,
     RADIUS_INDEX,
 };
-use crate::parameters::frame_estimate::FrameEstimate;
 use crate::parameters::shape_limits::BEND_RADIUS_RADII;
 use crate::point_fit::fit::{FittedWall, PointFit};
 use crate::points::wall_points::WallPoints;
@@ -21,7 +20,7 @@ use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_core::survey::{CalibrationGroup, DEFAULT_SHAPE_SIGMA_RADII};
 use tunnelstitch_geometry::surface::{RadialField, bent, displaced};
-use tunnelstitch_geometry::trajectory::{Pose, poses_of};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// The input and the options of a refinement, with what follows from both.
 pub struct Setup<'a> {
@@ -76,16 +75,7 @@ impl<'a> Setup<'a> {
             coarsest + 1,
             options.cache_bytes,
         );
-        let times_s: Vec<f64> = input.initial.iter().map(|stamped| stamped.time_s).collect();
-        let prior = Prior {
-            jitter: input.prior,
-            initial: poses_of(input.initial),
-            median_step_s: median_step_s(&times_s),
-            variance_ratios: variance_ratios(poses, input.pose_gaps),
-            times_s,
-            log_gain_sigma: options.log_gain_sigma,
-            bias_sigma: options.bias_sigma,
-        };
+        let prior = Prior::new(input.prior, input.initial, input.pose_gaps, options);
         let calibration = calibration_of(&input, options, &prior.initial)?;
         let tracking_prior = Prior {
             jitter: calibration.widen_jitter(&prior.jitter, prior.lever_arm_m()),
@@ -125,12 +115,7 @@ impl<'a> Setup<'a> {
                 return Err(RefineError::GivenByPoints { unknown });
             }
         }
-        let initial = self.prior.initial.iter();
-        let frames = FrameStates {
-            estimates: initial.map(|pose| FrameEstimate::at(*pose)).collect(),
-            rejections: vec![None; self.count()],
-            kappa: Kappa::zeros(),
-        };
+        let frames = FrameStates::at(&self.prior.initial, vec![None; self.count()]);
         let [from, to] = extent_h_m(&footprints(&self.initial_context(0.0), &frames)?);
         let radius_m = self.input.nominal_radius_m;
         let wall = PointFit {

@@ -13,7 +13,6 @@ use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::options::RefineOptions;
 use crate::parameters::calibration::{FOCAL_INDEX, Kappa};
-use crate::parameters::frame_estimate::FrameEstimate;
 use crate::tracking::neighbour_pairs::{first_frames, register_pairs};
 use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
 use tunnelstitch_core::progress::Progress;
@@ -44,12 +43,7 @@ pub fn search_focal_length(
     if reach == 0 || !calibration.free[FOCAL_INDEX] {
         return Ok(Kappa::zeros());
     }
-    let initial = context.prior.initial.iter();
-    let states = FrameStates {
-        estimates: initial.map(|pose| FrameEstimate::at(*pose)).collect(),
-        rejections: rejections.to_vec(),
-        kappa: Kappa::zeros(),
-    };
+    let states = FrameStates::at(&context.prior.initial, rejections.to_vec());
     let firsts = first_frames(states.estimates.len());
     progress.start("focal length", 2 * reach as usize + 1);
     let (mut best, mut found) = (f64::NEG_INFINITY, Kappa::zeros());

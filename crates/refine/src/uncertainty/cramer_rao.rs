@@ -45,10 +45,9 @@ use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::frame_states::FrameStates;
-use crate::model::prior::{Prior, median_step_s, variance_ratios};
+use crate::model::prior::Prior;
 use crate::options::RefineOptions;
 use crate::parameters::calibration::{Calibration, Kappa};
-use crate::parameters::frame_estimate::FrameEstimate;
 use crate::parameters::shape::Shape;
 use crate::parameters::wall_prior::WallPrior;
 use crate::problem::photometric_problem::PhotometricProblem;
@@ -103,21 +102,8 @@ pub fn pose_bounds(
         return Err(RefineError::NoOverlap);
     };
     let count = truth.len();
-    let times_s: Vec<f64> = survey
-        .initial
-        .iter()
-        .map(|stamped| stamped.time_s)
-        .collect();
     let options = RefineOptions::default();
-    let prior = Prior {
-        jitter: survey.prior,
-        initial: survey.initial_poses(),
-        median_step_s: median_step_s(&times_s),
-        variance_ratios: variance_ratios(survey.initial.len(), &survey.pose_gaps),
-        times_s,
-        log_gain_sigma: options.log_gain_sigma,
-        bias_sigma: options.bias_sigma,
-    };
+    let prior = Prior::new(survey.prior, &survey.initial, &survey.pose_gaps, &options);
     let camera = finer_camera(&survey.camera);
     let frames = fine
         .iter()
@@ -143,11 +129,7 @@ pub fn pose_bounds(
         dispersion: 1.0,
         noise: 0.0,
     };
-    let frames = FrameStates {
-        estimates: poses_of(truth).into_iter().map(FrameEstimate::at).collect(),
-        rejections: vec![None; count],
-        kappa: Kappa::zeros(),
-    };
+    let frames = FrameStates::at(&poses_of(truth), vec![None; count]);
     let extent_h_m = extent_h_m(&footprints(&flat, &frames)?);
     let model = wall.model(survey.nominal.perimeter_m(), extent_h_m);
     let context = EstimationContext {
