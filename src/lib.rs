@@ -74,7 +74,7 @@
 //! | `crates/core` | `bitmap_text`, `colour_map`, `persist`, `points`, `progress` < `raster`, `frames` < `survey`, `test_wall` |
 //! | `crates/refine` | `thresholds`, `options` < `parameters` < `linear` < `points` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `point_fit` < `tracking` < `validation` < `uncertainty` < `verdict` < `report` < `refined` < `stages` < `pipeline` < `deformation_bound`, `reading_search` |
 //! | `crates/render` | `error` < `layout` < `warp` < `sampling` < `compositing` < `output` |
-//! | `src` | `check` < `report`, `inspect` < `cli` |
+//! | `src` | `check` < `report`, `inspect`, `jobs` < `cli` |
 //!
 //! <!-- end of the order -->
 //!
@@ -139,6 +139,7 @@ pub mod check;
 #[doc(hidden)]
 pub mod cli;
 pub mod inspect;
+pub mod jobs;
 pub mod report;
 
 pub use tunnelstitch_core::{frames, persist, progress, raster, survey};

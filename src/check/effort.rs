@@ -55,6 +55,11 @@ impl Effort {
 
 /// Time of refine on all cores of this machine, seconds, within a factor of two or three.
 pub fn refine_s(survey: &Survey, options: &RefineOptions) -> f64 {
+    refine_processor_s(survey, options) / rayon::current_num_threads() as f64
+}
+
+/// Processor time of refine, seconds, within a factor of two or three.
+pub fn refine_processor_s(survey: &Survey, options: &RefineOptions) -> f64 {
     let frames = survey.frames.len() as f64;
     let pixels = f64::from(survey.camera.width) * f64::from(survey.camera.height);
     let radius_m = survey.file.tunnel.nominal_m();
@@ -62,7 +67,6 @@ pub fn refine_s(survey: &Survey, options: &RefineOptions) -> f64 {
     let search_s = TIME_PER_SEARCH_S * volume_deg3;
     let factor = if options.joint { JOINT_FACTOR } else { 1.0 };
     frames * factor * (TIME_PER_FRAME_S + TIME_PER_PIXEL_S * pixels + search_s)
-        / rayon::current_num_threads() as f64
 }
 
 /// Memory of refine, bytes, beside what the program takes for any survey.

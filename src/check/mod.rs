@@ -26,7 +26,7 @@ mod statistics;
 mod warnings;
 
 pub use deformation::DeformationCheck;
-pub use effort::{Effort, refine_bytes, refine_s};
+pub use effort::{Effort, refine_bytes, refine_processor_s, refine_s};
 pub use interlacing::interlacing_warning;
 pub use jitter::JitterCheck;
 pub use masks::MaskCheck;

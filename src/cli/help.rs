@@ -4,13 +4,14 @@ use clap::Command;
 use std::fmt::Write;
 
 /// Headings and the commands below them.
-const GROUPS: [(&str, &[&str]); 5] = [
+const GROUPS: [(&str, &[&str]); 6] = [
     ("Prepare a survey", &["init", "plan", "gyro", "check"]),
     ("Refine the poses", &["refine", "compare", "report"]),
     (
         "Use the result",
         &["stitch", "locate", "view", "export", "convert"],
     ),
+    ("Many surveys", &["plan-job", "run-job", "run-task"]),
     ("Try it", &["demo", "simulate", "converge", "project"]),
     ("The program", &["config", "completions", "man", "help"]),
 ];

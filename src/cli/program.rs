@@ -1,14 +1,15 @@
 //! The command line as a whole: global flags, all commands, and the call of the chosen one.
 
 use super::commands::{
-    check, compare, config, converge, convert, demo, export, gyro, init, locate, plan, project,
-    refine, report, shell, simulate, stitch, view,
+    check, compare, config, converge, convert, demo, export, gyro, init, locate, plan, plan_job,
+    project, refine, report, run_job, run_task, shell, simulate, stitch, view,
 };
 use super::configuration;
 use super::help::group_commands;
 use super::output::{
     Failure, RunRecord, Terminal, print_error, print_failures_as_json, refused_arguments,
 };
+use crate::jobs::end_processes;
 use crate::persist::atomic;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::sync::Arc;
@@ -98,6 +99,9 @@ enum Command {
     Export(export::ExportArguments),
     View(view::ViewArguments),
     Converge(converge::ConvergeArguments),
+    PlanJob(plan_job::PlanJobArguments),
+    RunJob(run_job::RunJobArguments),
+    RunTask(run_task::RunTaskArguments),
     Project(project::ProjectArguments),
     Config(config::ConfigArguments),
     Completions(shell::CompletionsArguments),
@@ -138,8 +142,12 @@ pub fn run() -> Result<(), Failure> {
 
 /// Removes unfinished files on Ctrl-C and ends the program with 130, the code that shells expect.
 fn handle_interrupts(command: &Command) -> Result<(), Failure> {
-    let is_resumable = matches!(command, Command::Refine(_) | Command::Stitch(_));
+    let is_resumable = matches!(
+        command,
+        Command::Refine(_) | Command::Stitch(_) | Command::RunJob(_)
+    );
     ctrlc::set_handler(move || {
+        end_processes();
         atomic::remove_unfinished();
         if is_resumable {
             print_error("interrupted; the same command continues from here");
@@ -173,6 +181,9 @@ impl Command {
             Self::Export(arguments) => export::run(arguments, record, terminal),
             Self::View(arguments) => view::run(arguments, terminal),
             Self::Converge(arguments) => converge::run(arguments, record, terminal),
+            Self::PlanJob(arguments) => plan_job::run(arguments, terminal),
+            Self::RunJob(arguments) => run_job::run(arguments, terminal),
+            Self::RunTask(arguments) => run_task::run(arguments, terminal),
             Self::Project(arguments) => project::run(arguments, record, terminal),
             Self::Config(arguments) => config::run(arguments, definition, terminal),
             Self::Completions(arguments) => shell::print_completions(arguments, definition),

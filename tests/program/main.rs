@@ -21,6 +21,7 @@ mod gis;
 mod gopro;
 mod gyro;
 mod init;
+mod jobs;
 mod lenses;
 mod locate;
 mod masks;

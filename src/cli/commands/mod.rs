@@ -14,13 +14,15 @@ pub mod locate;
 pub mod locate_points;
 pub mod overlay;
 pub mod plan;
+pub mod plan_job;
 pub mod project;
 pub mod refine;
 pub mod refine_files;
 pub mod refine_memory;
 pub mod refine_summary;
-
 pub mod report;
+pub mod run_job;
+pub mod run_task;
 pub mod shell;
 pub mod simulate;
 pub mod stitch;

@@ -5,6 +5,7 @@ use crate::evaluate::EvaluateError;
 use crate::evaluate::converge::ConvergeError;
 use crate::frames::FrameError;
 use crate::inspect::InspectError;
+use crate::jobs::JobError;
 use crate::persist::atomic::WriteError;
 use crate::persist::checkpoint::CheckpointError;
 use crate::raster::RasterError;
@@ -108,6 +109,27 @@ impl From<RefineError> for Failure {
     fn from(error: RefineError) -> Self {
         match error {
             RefineError::Problem(ProblemError::Checkpoint(error)) => error.into(),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<JobError> for Failure {
+    fn from(error: JobError) -> Self {
+        match error {
+            JobError::Survey { section, source } => {
+                let Self { message, code } = source.into();
+                Self {
+                    message: format!("section {section}: {message}"),
+                    code,
+                }
+            }
+            JobError::Write(error) => error.into(),
+            JobError::Failed { code, .. } => Self {
+                message: error.to_string(),
+                code,
+            },
+            JobError::NotReady { .. } | JobError::Busy { .. } => Self::temporary(error.to_string()),
             _ => Self::input(error.to_string()),
         }
     }

@@ -18,7 +18,9 @@ pub use dry_run::{DryRunArguments, Job};
 pub use duration::duration_text;
 pub use failure::Failure;
 pub use failure_output::{print_failure, print_failures_as_json, refused_arguments};
-pub use paths::{check_parent_folder, picture_format, refuse_overwriting, survey_files};
+pub use paths::{
+    check_parent_folder, own_program, picture_format, refuse_overwriting, survey_files,
+};
 pub use record::{RUN_FILE, RunRecord};
 pub use stream::{is_stream, refuse_two_results};
 pub use suggestion::{PosesReport, Suggestion, SuggestionArguments};

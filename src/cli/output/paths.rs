@@ -7,6 +7,15 @@ use crate::persist::atomic;
 use crate::survey::Survey;
 use std::path::{Path, PathBuf};
 
+/// The file of this program, for tasks that are calls of it.
+///
+/// # Errors
+/// A system that does not tell.
+pub fn own_program() -> Result<PathBuf, Failure> {
+    std::env::current_exe()
+        .map_err(|error| Failure::temporary(format!("cannot find the program's own file: {error}")))
+}
+
 /// Finds the format of a picture to be written, and checks its folder.
 ///
 /// # Errors

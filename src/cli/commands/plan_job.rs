@@ -1,0 +1,104 @@
+//! `tunnelstitch plan-job`: plans the work of a network of surveys as a graph of tasks.
+
+use crate::cli::output::{Failure, Terminal, duration_text};
+use crate::files::printed;
+use crate::jobs::{JOB_FILE, Job, Network, PlanOptions, Step, plan};
+use crate::persist::atomic;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Plans the work on a survey, or on a network of many, as a graph of tasks that any machine can
+/// run.
+///
+/// Writes job.json into DIR: tasks with command, inputs, outputs, needs and order. Each is a call of
+/// this program; `run-job` runs all of them on this machine, `run-task` one of them anywhere.
+/// Planned again, what is done stays done, as far as nothing that it follows from has changed.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "network.toml lists the sections of a network:\n  \
+    [[section]]\n  id = \"K12-K13\"            # names the folder of its results\n  \
+    survey = \"2026/K12-K13\"   # folder of the survey, or its survey.toml\n\n\
+    Options of a step are those of the section's survey.toml, as [options.stitch].\n\n\
+    Example:\n  tunnelstitch plan-job network.toml --out job\n  tunnelstitch run-job job")]
+pub struct PlanJobArguments {
+    /// A network.toml, or a survey (its folder, or its survey.toml).
+    #[arg(value_name = "NETWORK|SURVEY")]
+    network: PathBuf,
+    /// Folder of the job; created if missing.
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// Steps of every section; a list. Without `refine`, the initial poses are used.
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_values_t = [Step::Refine, Step::Stitch, Step::Report]
+    )]
+    steps: Vec<Step>,
+    /// Processors of each task. The results do not depend on it.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 2,
+        value_parser = clap::value_parser!(u16).range(1..=1024)
+    )]
+    cores: u16,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for everything wrong with the network, a survey, or the output.
+pub fn run(arguments: &PlanJobArguments, terminal: &Terminal) -> Result<(), Failure> {
+    let options = PlanOptions {
+        steps: arguments.steps.iter().copied().collect(),
+        cores: arguments.cores,
+    };
+    if options.steps.contains(&Step::Report) && !options.steps.contains(&Step::Refine) {
+        return Err(Failure::usage(
+            "--steps report needs refine, whose results it reports",
+        ));
+    }
+    let network = Network::read(&arguments.network)?;
+    atomic::check_folder(&arguments.out)?;
+    let job = plan(&network, &arguments.out, &options)?;
+    job.write(&arguments.out)?;
+    let report = PlanReport::of(&job, network.sections.len(), &arguments.out);
+    terminal.say(format!(
+        "planned {} tasks of {} sections: about {} of processor time, at most {} MiB for a task",
+        report.tasks,
+        report.sections,
+        duration_text(report.processor_seconds),
+        report.memory_bytes.div_ceil(1 << 20)
+    ));
+    terminal.say(format!(
+        "wrote {}; tunnelstitch run-job {} runs it",
+        printed(&arguments.out.join(JOB_FILE)),
+        printed(&arguments.out)
+    ));
+    terminal.result(&report)
+}
+
+/// The result, for `--json`.
+#[derive(Serialize)]
+struct PlanReport<'a> {
+    out: &'a Path,
+    sections: usize,
+    tasks: usize,
+    processor_seconds: f64,
+    memory_bytes: u64,
+}
+
+impl<'a> PlanReport<'a> {
+    fn of(job: &Job, sections: usize, out: &'a Path) -> Self {
+        let needs = || job.tasks.iter().map(|task| task.needs);
+        Self {
+            out,
+            sections,
+            tasks: job.tasks.len(),
+            processor_seconds: needs()
+                .map(|needs| f64::from(needs.cores) * needs.seconds)
+                .sum(),
+            memory_bytes: needs().map(|needs| needs.memory_bytes).max().unwrap_or(0),
+        }
+    }
+}

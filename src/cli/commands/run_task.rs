@@ -1,0 +1,63 @@
+//! `tunnelstitch run-task`: runs one task of a job.
+
+use crate::cli::output::{Failure, Terminal, duration_text, own_program};
+use crate::jobs::{DoneTask, Job, TaskRecord, run_task};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Runs one task of a job, on any machine that sees its files, unless it is done.
+///
+/// For engines that run the tasks of a job on many machines. A task may be run again at any time:
+/// it does nothing if it was done with its present inputs. What its command prints is in
+/// logs/TASK.log; state/TASK.json is the record.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Exit codes:\n  \
+    0   done, now or before\n  \
+    3   failed, and would fail again (1, 2: likewise)\n  \
+    4   done, but the result may not be used\n  \
+    75  failed, but may succeed later or elsewhere\n\n\
+    Example:\n  tunnelstitch run-task job K12-K13.refine")]
+pub struct RunTaskArguments {
+    /// Folder that plan-job has written.
+    job: PathBuf,
+    /// Identifier of the task in job.json.
+    task: String,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for everything wrong with the job, its inputs, or the command of the task.
+pub fn run(arguments: &RunTaskArguments, terminal: &Terminal) -> Result<(), Failure> {
+    let job = Job::read(&arguments.job)?;
+    let done = run_task(&arguments.job, &job, &arguments.task, &own_program()?)?;
+    let DoneTask {
+        record,
+        is_up_to_date,
+    } = &done;
+    let task = &arguments.task;
+    terminal.say(match is_up_to_date {
+        true => format!("{task}: up to date"),
+        false => format!("{task}: done in {}", duration_text(record.usage.seconds)),
+    });
+    terminal.result(&TaskReport {
+        task,
+        up_to_date: *is_up_to_date,
+        record,
+    })?;
+    match record.exit_code {
+        0 => Ok(()),
+        _ => Err(Failure::quality(format!(
+            "task {task}: its result may not be used; logs/{task}.log says why"
+        ))),
+    }
+}
+
+/// The result, for `--json`.
+#[derive(Serialize)]
+struct TaskReport<'a> {
+    task: &'a str,
+    up_to_date: bool,
+    #[serde(flatten)]
+    record: &'a TaskRecord,
+}

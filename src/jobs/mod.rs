@@ -1,0 +1,41 @@
+//! Jobs: a network of surveys as a graph of tasks, each a call of the program that reads and writes
+//! files, so that any engine that starts programs can run it on many machines (docs/jobs.md).
+//!
+//! ```text
+//! network.toml ─> Network ─> plan ─> Job (job.json) ─┬─> run_job: every task that is ready,
+//!                                                    │      as processors and memory allow
+//!                                                    └─> run_task: key, record, process
+//! ```
+//!
+//! | subject | file |
+//! | --- | --- |
+//! | sections and their surveys | [`Network`] |
+//! | the graph and its file | [`Job`] |
+//! | its tasks, with needs and expectations | [`plan()`] |
+//! | hash by which a task is done or not | `task_key` |
+//! | record of a task that is done | [`TaskRecord`] |
+//! | one task | [`run_task()`] |
+//! | a process with a limit of time | `process` |
+//! | all tasks on this machine | [`run_job()`] |
+
+mod error;
+mod job;
+mod network;
+mod parse_error;
+mod plan;
+mod process;
+mod run_job;
+mod run_task;
+mod schedule;
+mod task_key;
+mod task_record;
+
+pub use error::JobError;
+pub use job::{JOB_FILE, Job, Needs, Step, Task};
+pub use network::{Network, Section};
+pub use plan::{PlanOptions, plan};
+pub use process::end_processes;
+pub use run_job::{JobSummary, TaskEnd, TaskOutcome, run_job};
+pub use run_task::{DoneTask, read_records, run_task};
+pub use schedule::Machine;
+pub use task_record::TaskRecord;

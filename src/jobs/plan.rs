@@ -1,0 +1,312 @@
+//! The tasks of a network: their commands, files, needs and expectations.
+
+use super::error::JobError;
+use super::job::{Job, Needs, Step, Task};
+use super::network::{Network, Section};
+use crate::check::{refine_bytes, refine_processor_s};
+use crate::files::printed;
+use crate::refine::RefineOptions;
+use crate::render::native_px_per_metre;
+use crate::survey::Survey;
+use std::collections::BTreeSet;
+use std::path::{Component, Path, PathBuf, absolute};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+
+/// Processor time of a pixel of a panorama, seconds, with its share of decoding and writing.
+/// Measured on surveys of 320 × 240 to 640 × 480 px on a cloud machine.
+const TIME_PER_PANORAMA_PIXEL_S: f64 = 0.1e-6;
+/// Panoramas that a report compares: of initial and of refined poses.
+const PANORAMAS_OF_REPORT: f64 = 2.0;
+/// Processor time of starting the program, seconds.
+const START_S: f64 = 1.0;
+/// Memory of the program beside what it works on, bytes.
+const PROGRAM_BYTES: u64 = 128 << 20;
+/// Memory for parts of a panorama and pictures of frames, bytes.
+const PANORAMA_BYTES: u64 = 512 << 20;
+/// Times that a task may take as long as expected, which is right within a factor of three or so,
+/// before it is ended.
+const LIMIT_FACTOR: f64 = 40.0;
+/// Least time before a task is ended, seconds.
+const MIN_LIMIT_S: f64 = 600.0;
+
+/// Choices of a plan.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlanOptions {
+    /// The steps of every section.
+    pub steps: BTreeSet<Step>,
+    /// Processors of a task.
+    pub cores: u16,
+}
+
+/// Plans the tasks of a network for a job in `folder`.
+///
+/// # Errors
+/// A survey that cannot be opened; a job in a folder whose files are inputs.
+pub fn plan(network: &Network, folder: &Path, options: &PlanOptions) -> Result<Job, JobError> {
+    let folder = normalised(folder)?;
+    let tasks: Vec<Vec<Task>> = network
+        .sections
+        .par_map(|section| section_tasks(section, &folder, options))
+        .into_iter()
+        .collect::<Result<_, _>>()?;
+    Ok(Job::new(tasks.concat()))
+}
+
+/// The tasks of a section.
+fn section_tasks(
+    section: &Section,
+    folder: &Path,
+    options: &PlanOptions,
+) -> Result<Vec<Task>, JobError> {
+    let survey = Survey::open(&section.survey).map_err(|source| JobError::Survey {
+        section: section.id.clone(),
+        source,
+    })?;
+    let inputs = inputs_of(&survey, folder)?;
+    let work = Work::of(&survey);
+    let is_refined = options.steps.contains(&Step::Refine);
+    let call = Call {
+        id: &section.id,
+        survey: from_folder(&section.survey, folder)?,
+        is_refined,
+    };
+    let refine = format!("{}.{}", section.id, Step::Refine);
+    let tasks = options.steps.iter().map(|step| {
+        let (command, output) = call.command_and_output(*step);
+        Task {
+            id: format!("{}.{step}", section.id),
+            section: section.id.clone(),
+            step: *step,
+            command,
+            inputs: inputs.clone(),
+            outputs: vec![output.into()],
+            after: match is_refined && *step != Step::Refine {
+                true => vec![refine.clone()],
+                false => Vec::new(),
+            },
+            needs: work.needs(*step, options.cores),
+        }
+    });
+    Ok(tasks.collect())
+}
+
+/// What the commands of a section have in common.
+struct Call<'s> {
+    /// The section.
+    id: &'s str,
+    /// Its survey, from the folder of the job.
+    survey: PathBuf,
+    /// True if its poses are refined.
+    is_refined: bool,
+}
+
+impl Call<'_> {
+    /// The command of a step, and its output.
+    fn command_and_output(&self, step: Step) -> (Vec<String>, String) {
+        let Self { id, .. } = self;
+        let survey = self.survey.to_string_lossy();
+        let refined = format!("{id}/refined");
+        let poses = format!("{refined}/poses.tum");
+        let with_poses = match self.is_refined {
+            true => vec!["--poses", poses.as_str()],
+            false => Vec::new(),
+        };
+        let (options, flag, output) = match step {
+            Step::Refine => (Vec::new(), "--out", refined.clone()),
+            Step::Stitch => (with_poses, "--out", format!("{id}/panorama.tif")),
+            Step::Report => (
+                vec!["--refined", refined.as_str()],
+                "--out",
+                format!("{id}/report"),
+            ),
+            Step::Export => (with_poses, "--3dtiles", format!("{id}/tiles")),
+        };
+        let name = step.to_string();
+        let words = ["tunnelstitch", name.as_str(), survey.as_ref()];
+        let words = words
+            .into_iter()
+            .chain(options)
+            .chain([flag, output.as_str()]);
+        (words.map(str::to_owned).collect(), output)
+    }
+}
+
+/// The work of a section.
+struct Work {
+    /// Processor time of refining, seconds.
+    refine_s: f64,
+    /// Memory of refining, bytes.
+    refine_bytes: u64,
+    /// Pixels of the panorama at the frames' resolution.
+    panorama_px: f64,
+}
+
+impl Work {
+    fn of(survey: &Survey) -> Self {
+        let surface = survey.surface.as_ref();
+        let chainages = || {
+            let poses = survey.initial.iter();
+            poses.map(|stamped| surface.chainage_m(&stamped.pose.t_wc))
+        };
+        let length_m = chainages().fold(f64::NEG_INFINITY, f64::max)
+            - chainages().fold(f64::INFINITY, f64::min);
+        // A camera that shows no wall makes no panorama: refining says so.
+        let px_per_metre = native_px_per_metre(surface, &survey.camera, &survey.initial_poses());
+        let px_per_metre = px_per_metre.unwrap_or_default();
+        let height = length_m * px_per_metre + f64::from(survey.camera.height);
+        Self {
+            refine_s: refine_processor_s(survey, &RefineOptions::default()),
+            refine_bytes: refine_bytes(survey),
+            panorama_px: surface.perimeter_m() * px_per_metre * height,
+        }
+    }
+
+    fn needs(&self, step: Step, cores: u16) -> Needs {
+        let panorama_s = TIME_PER_PANORAMA_PIXEL_S * self.panorama_px;
+        let (processor_s, bytes) = match step {
+            Step::Refine => (self.refine_s, self.refine_bytes),
+            Step::Stitch | Step::Export => (panorama_s, PANORAMA_BYTES),
+            Step::Report => (PANORAMAS_OF_REPORT * panorama_s, PANORAMA_BYTES),
+        };
+        let seconds = START_S + processor_s / f64::from(cores);
+        Needs {
+            cores,
+            memory_bytes: PROGRAM_BYTES + bytes,
+            seconds,
+            limit_seconds: (LIMIT_FACTOR * seconds).max(MIN_LIMIT_S),
+        }
+    }
+}
+
+/// The files of a survey, and the folders of its frames, from the folder of the job.
+fn inputs_of(survey: &Survey, folder: &Path) -> Result<Vec<PathBuf>, JobError> {
+    let mut inputs: BTreeSet<PathBuf> = BTreeSet::new();
+    for path in survey.own_files() {
+        inputs.insert(from_folder(path, folder)?);
+    }
+    for frame in survey.frames.iter() {
+        match frame.shared_file() {
+            Some(file) => {
+                inputs.insert(from_folder(file, folder)?);
+                break;
+            }
+            None => {
+                let frames = frame.path.parent().unwrap_or(Path::new("."));
+                let from = from_folder(frames, folder)?;
+                if from
+                    .components()
+                    .all(|part| part == std::path::Component::ParentDir)
+                {
+                    return Err(JobError::Value {
+                        path: folder.to_owned(),
+                        what: format!(
+                            "the job would be in {}, a folder of frames, all files of which are \
+                             inputs; choose another --out",
+                            printed(frames)
+                        ),
+                    });
+                }
+                inputs.insert(from);
+            }
+        }
+    }
+    Ok(inputs.into_iter().collect())
+}
+
+/// A path as seen from the (normalised) folder of the job.
+fn from_folder(path: &Path, folder: &Path) -> Result<PathBuf, JobError> {
+    let path = normalised(path)?;
+    // Without a relative path, as on another drive, the absolute one.
+    Ok(pathdiff::diff_paths(&path, folder).unwrap_or(path))
+}
+
+/// The absolute path without `.` and `..`.
+fn normalised(path: &Path) -> Result<PathBuf, JobError> {
+    let absolute = absolute(path).map_err(|source| JobError::Read {
+        path: path.to_owned(),
+        source,
+        remedy: "",
+    })?;
+    let mut normal = PathBuf::new();
+    for part in absolute.components() {
+        match part {
+            Component::ParentDir => {
+                normal.pop();
+            }
+            _ => normal.push(part),
+        }
+    }
+    Ok(normal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{SimulateOptions, write_survey};
+
+    fn survey(folder: &Path) -> Section {
+        let options = SimulateOptions {
+            frames: 2,
+            supersample: 1,
+            camera: crate::camera::Camera::from_vertical_fov(32, 24, 1.0),
+            ..SimulateOptions::free()
+        };
+        write_survey(&options, folder, false, &crate::progress::Silent).unwrap();
+        Section {
+            id: "K1".to_owned(),
+            survey: folder.to_owned(),
+        }
+    }
+
+    fn options(steps: &[Step]) -> PlanOptions {
+        PlanOptions {
+            steps: steps.iter().copied().collect(),
+            cores: 2,
+        }
+    }
+
+    /// Whatever way the paths are written.
+    #[test]
+    fn paths_are_relative_to_the_job() {
+        let dir = tempfile::tempdir().unwrap();
+        let section = survey(&dir.path().join("s/../surveys/K1"));
+        let network = Network {
+            sections: vec![section],
+        };
+        let steps = [Step::Export, Step::Refine];
+        let folder = dir.path().join("x/../jobs/./K");
+        let job = plan(&network, &folder, &options(&steps)).unwrap();
+        let [refine, export] = &job.tasks[..] else {
+            panic!("{job:?}");
+        };
+        let text = |task: &Task| task.command.join(" ");
+        assert_eq!(
+            text(refine),
+            "tunnelstitch refine ../../surveys/K1 --out K1/refined"
+        );
+        assert_eq!(
+            text(export),
+            "tunnelstitch export ../../surveys/K1 --poses K1/refined/poses.tum --3dtiles K1/tiles"
+        );
+        assert!(refine.inputs.contains(&"../../surveys/K1/frames".into()));
+        assert_eq!(export.after, ["K1.refine"]);
+        job.write(&folder).unwrap();
+        assert_eq!(Job::read(&folder).unwrap(), job);
+    }
+
+    #[test]
+    fn a_job_among_its_own_inputs_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let network = Network {
+            sections: vec![survey(dir.path())],
+        };
+        let folder = dir.path().join("frames/job");
+        let error = plan(&network, &folder, &options(&[Step::Stitch])).unwrap_err();
+        assert!(
+            error.to_string().contains("choose another --out"),
+            "{error}"
+        );
+        let beside = plan(&network, &dir.path().join("job"), &options(&[Step::Stitch]));
+        assert!(beside.unwrap().tasks[0].after.is_empty());
+    }
+}
