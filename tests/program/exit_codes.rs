@@ -138,7 +138,7 @@ fn memory_that_ends_at_any_moment_is_temporary() {
         "2",
     ];
     let mut codes = Vec::new();
-    for megabytes in (40..420).step_by(20) {
+    for megabytes in (40..420).step_by(38) {
         let output = limited(&format!("ulimit -v {megabytes}000"), &arguments, "");
         let code = output.status.code();
         let message = String::from_utf8_lossy(&output.stderr);

@@ -169,7 +169,7 @@ fn uneven_light_highlights_and_moving_objects_do_no_harm() {
 /// larger gradients than the wall.
 #[test]
 fn hard_light_does_no_harm_on_a_faint_wall() {
-    let light = "--frames 24 --wall concrete --gain-percent 30 --lamp-corner 0.4 \
+    let light = "--frames 24 --size 480x360 --wall concrete --gain-percent 30 --lamp-corner 0.4 \
                  --specular-percent 3 --seed 2";
     let dir = simulate_and_refine(&light.split_whitespace().collect::<Vec<_>>());
     let out = dir.path().join("out");

@@ -93,7 +93,7 @@ fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str) {
             "--centreline",
             text(&line),
             "--frames",
-            "24",
+            "20",
             "--size",
             "240x180",
             "--advance-m",
