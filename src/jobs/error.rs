@@ -79,7 +79,7 @@ pub enum JobError {
         /// The one before.
         after: String,
     },
-    /// The same task is running.
+    /// The task is running already.
     #[error("task {task} is running already; wait for it to end")]
     Busy {
         /// The task.

@@ -219,7 +219,7 @@ impl Task {
         let is_time = |seconds: f64| seconds > 0.0 && seconds.is_finite();
         if !is_time(seconds) || !is_time(limit_seconds) {
             return Err(format!(
-                "task {id} needs {seconds} of at most {limit_seconds} seconds; both must be positive"
+                "task {id} needs {seconds} of at most {limit_seconds} s; both must be positive"
             ));
         }
         Ok(())

@@ -90,7 +90,7 @@ fn section_tasks(
     Ok(tasks.collect())
 }
 
-/// What the commands of a section have in common.
+/// The commands of a section.
 struct Call<'s> {
     /// The section.
     id: &'s str,

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// Plans the work on a survey, or on a network of many, as a graph of tasks that any machine can
 /// run.
 ///
-/// Writes job.json into DIR: tasks with command, inputs, outputs, needs and order. Each is a call of
-/// this program; `run-job` runs all of them on this machine, `run-task` one of them anywhere.
+/// Writes job.json into DIR: tasks with command, inputs, outputs, needs and order. Each is a call
+/// of this program; `run-job` runs all of them on this machine, `run-task` one of them anywhere.
 /// Planned again, what is done stays done, as far as nothing that it follows from has changed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "network.toml lists the sections of a network:\n  \
