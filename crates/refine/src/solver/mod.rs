@@ -1,6 +1,7 @@
 //! Damped Gauss–Newton over a photometric problem.
 
 pub mod argmin_glue;
+pub mod evidence_fall;
 pub mod gauss_newton;
 pub mod neighbourhood;
 pub mod shape_evidence;

@@ -23,9 +23,8 @@
 //! none had been looked for.
 //!
 //! The same L bounds what may hide below that: the strength of a dropped scale at which L has
-//! fallen by `½ z²`, z the quantile of the false-alarm rate, is what would have been seen
-//! ([`LearnedShape::dropped_scales`]); that at which it has fallen by ½, 1-σ, makes errors
-//! ([`LearnedShape::unseen_errors`]).
+//! fallen by `½ z²`, z the quantile of the false-alarm rate, is what would have been seen; that at
+//! which it has fallen by ½, 1-σ, makes errors ([`DroppedScale`], [`LearnedShape::unseen_errors`]).
 //!
 //! A solve that ends for want of descent, as where the wall is not smooth, leaves a gradient that
 //! leads nowhere: then its end is taken for the minimum.
@@ -42,6 +41,7 @@ use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::parameters::shape::{Functions, Scale, Shape, ShapeModel, ShapeStep};
 use crate::parameters::unseen_errors::{EXPECTED_SQUARE, UNSEEN_DRAWS, UnseenError, UnseenErrors};
+use crate::solver::evidence_fall::EvidenceFall;
 use crate::solver::gauss_newton::Solution;
 use nalgebra::SMatrix;
 use rand::{Rng, SeedableRng};
@@ -57,8 +57,6 @@ const MAX_STEPS: usize = 8;
 const CONVERGED: f64 = 0.05;
 /// Random sign vectors per scale. The relative error of γ is `√(2/(16 γ))` or less.
 const PROBES: usize = 16;
-/// Bisections of the logarithm of a dropped scale's strength, which leave a sixth of it open.
-const LIMIT_BISECTIONS: usize = 6;
 /// Strength of a scale that is as good as dropped, over the given one.
 const NEGLIGIBLE: f64 = 1e-4;
 /// Largest factor of a strength in one step.
@@ -70,6 +68,16 @@ pub struct LearnedShape<'s> {
     minimum: Minimum<'s>,
     sigmas_m: Vec<f64>,
     dropped: Vec<bool>,
+}
+
+/// A scale that is dropped, and how strong it may be all the same.
+pub struct DroppedScale {
+    /// Its index in the shape of the solve.
+    index: usize,
+    /// 1-σ of its strength, metres: where L has fallen by ½.
+    typical_m: f64,
+    /// The scale with the strength that would have been seen, but for the rate of false alarms.
+    pub limit: Scale,
 }
 
 /// Learns the strengths of the shape at a solution; None if no shape was estimated, or if the
@@ -325,51 +333,45 @@ impl LearnedShape<'_> {
         }
     }
 
-    /// The dropped scales, with the largest strength that each may have but for the probability
-    /// `alpha`, up to `most_m` metres; none if the equations are singular.
-    pub fn dropped_scales(&self, most_m: f64, alpha: f64) -> Vec<Scale> {
-        let limits = self.strengths_where_evidence_falls(normal_quantile(alpha, 1), most_m);
-        limits.into_iter().map(|(_, scale)| scale).collect()
-    }
-
-    /// The dropped scales, with their indices, each with the strength up to `most_m` at which L has
-    /// fallen by `½ z²`; none if the equations are singular.
-    fn strengths_where_evidence_falls(&self, z: f64, most_m: f64) -> Vec<(usize, Scale)> {
+    /// The dropped scales, with the strengths up to `most_m` metres that they may have, `alpha`
+    /// being the rate of false alarms; without those for which the equations are singular.
+    pub fn dropped_scales(&self, most_m: f64, alpha: f64) -> Vec<DroppedScale> {
         let scales = &self.equations.shape.model.scales;
-        let least = self.minimum.log_evidence - 0.5 * z * z;
         let dropped: Vec<usize> = (0..scales.len()).filter(|k| self.dropped[*k]).collect();
-        let limits = dropped.par_map(|k| {
-            let scale = scales[*k];
-            let (mut below_m, mut above_m) = (NEGLIGIBLE * scale.sigma_m, most_m);
-            for _ in 0..LIMIT_BISECTIONS {
+        let fall = |z: f64| 0.5 * z * z;
+        let found = dropped.par_map(|k| {
+            let of_strength = |sigma_m: f64| {
                 let mut sigmas_m = self.sigmas_m.clone();
-                sigmas_m[*k] = (below_m * above_m).sqrt();
-                match self.equations.minimum(&sigmas_m)?.log_evidence < least {
-                    true => above_m = sigmas_m[*k],
-                    false => below_m = sigmas_m[*k],
-                }
-            }
-            let limit = Scale {
-                sigma_m: above_m,
-                ..scale
+                sigmas_m[*k] = sigma_m;
+                let log_evidence = self.equations.minimum(&sigmas_m)?.log_evidence;
+                Some(self.minimum.log_evidence - log_evidence)
             };
-            Some((*k, limit))
+            let range_m = [NEGLIGIBLE * scales[*k].sigma_m, most_m];
+            let mut falls = EvidenceFall::default();
+            let mut limit = |z: f64| falls.strength_m(fall(z), range_m, of_strength);
+            Some(DroppedScale {
+                index: *k,
+                typical_m: limit(1.0)?,
+                limit: Scale {
+                    sigma_m: limit(normal_quantile(alpha, 1))?,
+                    ..scales[*k]
+                },
+            })
         });
-        limits.into_iter().flatten().collect()
+        found.into_iter().flatten().collect()
     }
 
-    /// Draws the errors that the dropped scales make
+    /// Draws the errors that these dropped scales make
     /// ([module documentation](crate::parameters::unseen_errors)), with the shared parameters
     /// `held` known; none if the equations are singular. `seed`: another one for every solve.
     pub fn unseen_errors(
         &self,
-        most_m: f64,
+        dropped: &[DroppedScale],
         held: &[bool; SHARED_PARAMETERS],
         seed: u64,
     ) -> UnseenErrors {
         let equations = &self.equations;
-        let admitted = self.strengths_where_evidence_falls(1.0, most_m);
-        if admitted.is_empty() {
+        if dropped.is_empty() {
             return UnseenErrors::default();
         }
         let slots: Vec<Range<usize>> = equations.slots().collect();
@@ -377,10 +379,10 @@ impl LearnedShape<'_> {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(draw as u64);
             let mut gradient = vec![FrameStep::zeros(); equations.pattern.columns()];
-            for (k, scale) in &admitted {
-                let information = self.sigmas_m[*k].powi(-2);
-                let amplitude = EXPECTED_SQUARE.sqrt() * scale.sigma_m * information;
-                for slot in slots[*k].clone() {
+            for scale in dropped {
+                let information = self.sigmas_m[scale.index].powi(-2);
+                let amplitude = EXPECTED_SQUARE.sqrt() * scale.typical_m * information;
+                for slot in slots[scale.index].clone() {
                     gradient[slot] = FrameStep::from_fn(|_, _| StandardNormal.sample(&mut rng));
                     gradient[slot] *= amplitude;
                 }
@@ -477,20 +479,23 @@ mod tests {
         };
         let learned = equations.learn(0.03, 1e-3).unwrap();
         // Each of n coefficients is known to 1 mm, so L falls by about n σ⁴/4 mm⁴.
-        for dropped in learned.dropped_scales(0.03, 1e-3) {
-            let n = 8.0 * dropped.functions.blocks() as f64;
+        let dropped = learned.dropped_scales(0.03, 1e-3);
+        assert!(!dropped.is_empty());
+        for DroppedScale { limit, .. } in &dropped {
+            let n = 8.0 * limit.functions.blocks() as f64;
             let expected_m = 1e-3 * (4.0 * 4.77 / n).powf(0.25);
             assert!(
-                (0.5..2.5).contains(&(dropped.sigma_m / expected_m)),
-                "{dropped:?}"
+                (0.5..2.5).contains(&(limit.sigma_m / expected_m)),
+                "{limit:?}"
             );
         }
         // What no pixel ties to the frame displaces the wall alone, by as much as L admits.
-        let admitted = learned.strengths_where_evidence_falls(1.0, 0.03);
-        let unseen = learned.unseen_errors(0.03, &[false; SHARED_PARAMETERS], 1);
-        let variance =
-            |(_, scale): &(usize, Scale)| (scale.functions.rms() * scale.sigma_m).powi(2);
-        let expected = EXPECTED_SQUARE * admitted.iter().map(variance).sum::<f64>();
+        let unseen = learned.unseen_errors(&dropped, &[false; SHARED_PARAMETERS], 1);
+        let variance = |scale: &DroppedScale| {
+            let rms = scale.limit.functions.rms();
+            (rms * scale.typical_m).powi(2)
+        };
+        let expected = EXPECTED_SQUARE * dropped.iter().map(variance).sum::<f64>();
         let at = |k: usize| WallPoint {
             s_m: (k as f64 * 7.3) % 18.0,
             h_m: 1.0 + (k as f64 * 3.1) % 7.0,

@@ -131,7 +131,8 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_l
         return false;
     };
     let mut shape = learned.shape_after(&step);
-    let limits = learned.dropped_scales(most_m, setup.options.false_alarm_rate);
+    let dropped = learned.dropped_scales(most_m, setup.options.false_alarm_rate);
+    let limits = dropped.iter().map(|scale| scale.limit);
     shape.model.dropped.extend(limits);
     let shape = with_finer_lattice(shape);
     let before = solution.problem.shape().map(|before| &before.model);
@@ -143,7 +144,7 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_l
         .stepped(&solution.linearised_at, &step, &shared);
     let unseen = std::mem::take(&mut state.unseen);
     let solves = state.levels.len() as u64;
-    state.unseen = unseen.plus(learned.unseen_errors(most_m, &tested, solves));
+    state.unseen = unseen.plus(learned.unseen_errors(&dropped, &tested, solves));
     (state.free, state.tested) = (free, tested);
     setup.replace_kappa(state, stepped.kappa);
     for (estimate, stepped) in state.frames.estimates.iter_mut().zip(stepped.frames) {
