@@ -1,4 +1,4 @@
-"""Stands in for `tunnelstitch`: `stub run-task JOB ID` behaves as docs/jobs.md says.
+"""Stands in for `tunnelstitch`: `stub run-task JOB ID --json` behaves as docs/jobs.md says.
 
 The command of a task is `[program, SECONDS]`: it works for that time, then writes the hash of its
 key to its outputs. `faults/ID` in the folder of the job has a line for each attempt that goes
@@ -13,14 +13,14 @@ import signal
 import sys
 import time
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TextIO
 
 USAGE, BAD_INPUT, NOT_USABLE, TEMPORARY = 2, 3, 4, 75
 
 
 def fail(code: int, message: str) -> NoReturn:
     """Ends as the program does."""
-    print(f"error: {message}", file=sys.stderr)
+    print(json.dumps({"error": message, "exit_code": code}), file=sys.stderr)
     sys.exit(code)
 
 
@@ -69,29 +69,29 @@ def next_fault(folder: Path, name: str) -> list[str]:
     return first.split() or ["none"]
 
 
-def misbehave(fault: list[str], name: str, limit_seconds: float) -> int:
+def misbehave(fault: list[str], name: str, limit_seconds: float, log: TextIO) -> int:
     """Does what the fault says; returns the exit code of a command that works."""
-    log = f"; see logs/{name}.log"
+    place = f"; see logs/{name}.log"
     match fault:
         case ["none"]:
             return 0
         case ["not-usable"]:
             return NOT_USABLE
         case ["bad-input"]:
-            print("error: frame 7 is no picture")
-            fail(BAD_INPUT, f"task {name}: frame 7 is no picture{log}")
+            print("error: frame 7 is no picture", file=log)
+            fail(BAD_INPUT, f"task {name}: frame 7 is no picture{place}")
         case ["signal", number]:
-            fail(TEMPORARY, f"task {name}: it was ended by signal {number}{log}")
+            fail(TEMPORARY, f"task {name}: it was ended by signal {number}{place}")
         case ["full-disk"]:
-            fail(TEMPORARY, f"task {name}: No space left on device{log}")
+            fail(TEMPORARY, f"task {name}: No space left on device{place}")
         case ["memory", needed]:
             if int(os.environ.get("STUB_MEMORY_BYTES", "0")) < int(needed):
-                fail(TEMPORARY, f"task {name}: too little memory{log}")
+                fail(TEMPORARY, f"task {name}: too little memory{place}")
             return 0
         case ["slow"]:
             time.sleep(limit_seconds)
             limit = f"limit of {limit_seconds:.0f} seconds"
-            fail(TEMPORARY, f"task {name}: it was ended after its {limit}{log}")
+            fail(TEMPORARY, f"task {name}: it was ended after its {limit}{place}")
         case ["hang"]:
             time.sleep(3600)
         case ["stop-worker"]:
@@ -122,19 +122,21 @@ def run_task(folder: Path, name: str) -> int:
         fail(TEMPORARY, f"task {name} is running already; wait for it to end")
     done = record(folder, tasks, name)
     if done is not None and (done or all((folder / path).exists() for path in task["outputs"])):
+        print(json.dumps({"task": name, "up_to_date": True}))
         return done
     append(folder / "starts" / name, str(os.getpid()))
     (folder / "logs").mkdir(exist_ok=True)
-    sys.stdout = (folder / "logs" / f"{name}.log").open("w")
-    print(f"begin {name}")
+    log = (folder / "logs" / f"{name}.log").open("w")
+    print(f"begin {name}", file=log, flush=True)
     own_key = key(folder, tasks, name)
     fault = next_fault(folder, name)
     time.sleep(float(task["command"][1]))
-    code = misbehave(fault, name, task["needs"]["limit_seconds"])
+    code = misbehave(fault, name, task["needs"]["limit_seconds"], log)
     for path in task["outputs"] if code == 0 else []:
         write(folder / path, hashlib.sha256(own_key.encode()).hexdigest())
     write(folder / "state" / f"{name}.json", json.dumps({"key": own_key, "exit_code": code}))
     append(folder / "runs" / name, str(os.getpid()))
+    print(json.dumps({"task": name, "up_to_date": False}))
     return code
 
 

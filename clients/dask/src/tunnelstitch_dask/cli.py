@@ -23,7 +23,6 @@ from .summary import INTERRUPTED, Summary
 
 # Exit code of bad input, as in tunnelstitch.
 BAD_INPUT = 3
-CONNECT_TIMEOUT_SECONDS = 30.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -124,7 +123,7 @@ def _connect(choices: argparse.Namespace) -> Iterator[Client]:
             yield client
         return
     try:
-        client = Client(choices.scheduler, timeout=CONNECT_TIMEOUT_SECONDS)
+        client = Client(choices.scheduler)
     except (OSError, ValueError) as error:
         raise ClusterError(
             f"cannot reach the scheduler {choices.scheduler}: {error}; start one with "

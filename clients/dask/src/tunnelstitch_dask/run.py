@@ -130,10 +130,12 @@ class JobRun:
         self._capacity = Capacity.of_cluster(self._client)
 
     def _submit(self, tasks: list[Task]) -> None:
-        """Submits new attempts; tasks before them are done or submitted."""
+        """Submits new attempts, except of tasks that come after one that waits for its own."""
         for task in tasks:
             state = self._states[task.id]
-            state.begin_attempt()
+            state.end_attempt()
+            if self._has_unsubmitted_before(task):
+                continue
             attempt = state.attempt
             call = Call(
                 run=self._id,
@@ -161,6 +163,10 @@ class JobRun:
         """Futures of the tasks that are not done; the results of others are in the job's files."""
         states = (self._states[name] for name in tasks)
         return [state.future for state in states if state.phase.is_open and state.future]
+
+    def _has_unsubmitted_before(self, task: Task) -> bool:
+        states = (self._states[name] for name in task.after)
+        return any(state.phase.is_open and state.future is None for state in states)
 
     def _put_event(self, event: tuple[float, dict[str, Any]]) -> None:
         self._events.put(event[1])
@@ -201,9 +207,10 @@ class JobRun:
         except CancelledError as error:
             self._handle_cancelled(error)
         except KilledWorker as error:
-            # Otherwise it is that of a task before this one.
             if error.task == event.future.key:
                 self._handle_killed_worker(state)
+            else:
+                self._repeat_without_outcome(state)
         except Exception as error:
             self._fail(state, None, f"{type(error).__name__}: {error}", "")
         else:
@@ -227,7 +234,7 @@ class JobRun:
 
     def _end_attempt(self, state: TaskState, outcome: Outcome) -> None:
         if outcome.code is None:
-            # The attempt of a task before it has failed, which decides.
+            self._repeat_without_outcome(state)
             return
         name = state.task.id
         if outcome.code == DONE:
@@ -249,6 +256,15 @@ class JobRun:
             self._wait_for_other_run(state)
         else:
             self._retry(state, outcome.cause, outcome.message, outcome.log)
+
+    def _repeat_without_outcome(self, state: TaskState) -> None:
+        """Plans another attempt of a task that did not run, since one before it had no outcome.
+
+        If that one has failed, they are repeated together. It may have been done, though: when
+        its worker is lost, the scheduler runs it again for its dependants.
+        """
+        if not self._has_unsubmitted_before(state.task):
+            self._plan_attempt(state, self._options.backoff_seconds)
 
     def _wait_for_other_run(self, state: TaskState) -> None:
         """Looks again later at a task that another client, or a lost worker, is running."""
@@ -291,7 +307,6 @@ class JobRun:
             return
         self._capacity = Capacity.of_cluster(self._client)
         again = {task.id for name in due for task in self._graph.dependants(name)} | set(due)
-        # A dependant may be waiting for an attempt of its own.
         self._submit([task for task in self._open_tasks() if task.id in again])
 
     def _handle_killed_worker(self, state: TaskState) -> None:

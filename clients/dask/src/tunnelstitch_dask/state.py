@@ -49,11 +49,7 @@ class TaskState:
     retries: int = 0
     """Failures that count towards the largest number of retries."""
 
-    def begin_attempt(self) -> None:
-        """Begins another attempt, whose future is to be set."""
-        self.end_attempt(due_s=None)
-
-    def end_attempt(self, due_s: float | None) -> None:
+    def end_attempt(self, due_s: float | None = None) -> None:
         """Ends the present attempt, so that nothing that it still tells counts."""
         self.release()
         self.attempt += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import subprocess
 import sys
@@ -77,33 +78,31 @@ def _call(call: Call, worker: str, begin: float) -> Outcome:
             "workers see it (--worker-path)"
         )
         return Outcome(call.task, BAD_INPUT, message, worker=worker)
-    record = folder / "state" / f"{call.task}.json"
-    before = _identity(record)
-    with tempfile.TemporaryFile() as stderr:
-        code = _run_process(call, stderr)
-        message = _tail(stderr).strip().removeprefix("error: ")
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        code = _run_process(call, out, err)
+        result, messages = _tail(out), _tail(err)
     return Outcome(
         task=call.task,
         code=code,
-        message=message,
+        message=_error(messages),
         log="" if code in (DONE, NOT_USABLE) else _log_tail(folder, call.task),
-        has_run=_identity(record) != before,
+        has_run=not _is_up_to_date(result),
         seconds=time.monotonic() - begin,
         worker=worker,
     )
 
 
-def _run_process(call: Call, stderr: IO[bytes]) -> int:
+def _run_process(call: Call, out: IO[bytes], err: IO[bytes]) -> int:
     """Runs `run-task` under its supervisor; returns the exit code."""
     python = [sys.executable, "-I", "-S", supervisor.__file__, str(call.limit_seconds)]
     with _lock:
         if call.run in _cancelled:
             return TEMPORARY
         process = subprocess.Popen(
-            [*python, call.program, "run-task", call.folder, call.task],
+            [*python, call.program, "run-task", call.folder, call.task, "--json"],
             stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=stderr,
+            stdout=out,
+            stderr=err,
             start_new_session=True,
         )
         _running[call.run].add(process)
@@ -116,19 +115,27 @@ def _run_process(call: Call, stderr: IO[bytes]) -> int:
     return TEMPORARY if code < 0 or code == INTERRUPTED else code
 
 
+def _is_up_to_date(result: str) -> bool:
+    """True if the result of `run-task --json` says that the task was done before."""
+    try:
+        return json.loads(result).get("up_to_date") is True
+    except (ValueError, AttributeError):
+        return False
+
+
+def _error(messages: str) -> str:
+    """The error in what `run-task --json`, or its supervisor, printed; else all of it."""
+    text = messages.strip()
+    try:
+        return str(json.loads(text.splitlines()[-1])["error"])
+    except (ValueError, IndexError, KeyError, TypeError):
+        return text.removeprefix("error: ")
+
+
 def _release(process: subprocess.Popen[bytes]) -> None:
     """Closes the pipe on whose end the supervisor ends the task."""
     if process.stdin is not None:
         process.stdin.close()
-
-
-def _identity(path: Path) -> tuple[int, int] | None:
-    """Changes when a file is replaced; None without a file."""
-    try:
-        status = path.stat()
-    except OSError:
-        return None
-    return status.st_ino, status.st_mtime_ns
 
 
 def _log_tail(folder: Path, task: str) -> str:
