@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+import dask.config
 import pytest
 from distributed import Client, Nanny, Scheduler, SpecCluster
 from jobs import JobFolder
@@ -35,6 +36,8 @@ def cluster() -> Iterator[SpecCluster]:
         "cls": Scheduler,
         "options": {"dashboard": False, "port": 0, "host": "127.0.0.1"},
     }
+    # Otherwise a worker that is killed again just then is given up.
+    dask.config.set({"distributed.deploy.lost-worker-timeout": "1h"})
     with SpecCluster(workers=workers, scheduler=scheduler, silence_logs=50) as cluster:
         yield cluster
 

@@ -157,7 +157,8 @@ def test_workers_killed_at_random_change_no_byte(
         while kills < 20 and not stop.wait(choice.uniform(0.2, 0.6)):
             nanny = choice.choice(list(cluster.workers.values()))
             # A nanny gives up on a worker that dies before it has started.
-            if nanny.status is Status.running and nanny.pid is not None:
+            process = nanny.process
+            if process is not None and process.status is Status.running and nanny.pid:
                 os.kill(nanny.pid, signal.SIGKILL)
                 kills += 1
 

@@ -32,8 +32,10 @@ from .worker import Call, end_tasks, run_task
 
 # Longest pause before another attempt, seconds.
 MAX_BACKOFF_S = 60.0
-# Longest wait for an event, after which tasks are looked at, seconds.
-MAX_WAIT_S = 0.5
+# Time between two looks at all tasks, seconds.
+LOOK_INTERVAL_S = 0.1
+# Time between two looks at the workers, seconds.
+WORKER_LOOK_INTERVAL_S = 10.0
 # Time in which workers must have ended the tasks of a cancelled run, seconds.
 CANCEL_SECONDS = 30.0
 
@@ -57,7 +59,7 @@ class RunOptions:
     worker_path: str | None = None
     """Folder of the job as workers see it; None if they see it as the client does."""
     worker_timeout_seconds: float = 300.0
-    """Time in which the first worker must be there."""
+    """Longest time without any worker."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,9 @@ class JobRun:
         self._id = f"tunnelstitch-{uuid.uuid4().hex}"
         self._folder = self._options.worker_path or str(job.folder)
         self._states = {task.id: TaskState(task, task.needs.memory_bytes) for task in job.tasks}
+        self._open = set(self._states)
+        self._next_look_s = self._next_worker_look_s = 0.0
+        self._last_worker_s = time.monotonic()
         self._priorities = self._graph.path_seconds(job.tasks, lambda task: task.needs.seconds)
         self._events: queue.SimpleQueue[dict[str, Any] | _Settled] = queue.SimpleQueue()
         self._progress = Progress(stream or sys.stderr, self._graph)
@@ -103,23 +108,54 @@ class JobRun:
             self._wait_for_worker()
             self._client.subscribe_topic(self._id, self._put_event)
             self._submit(self._open_tasks())
-            while self._open_tasks():
+            while self._open:
                 self._handle_events()
-                self._repeat_due_tasks()
-                self._end_overdue_tasks()
-                self._progress.show(self._states.values())
+                self._look_at_clock()
+        except OSError as error:
+            # Of a call to a scheduler that is lost.
+            self._cancel()
+            raise ClusterError(f"the connection to the scheduler was lost: {error}") from error
         except BaseException:
             self._cancel()
             raise
         finally:
             self.summary.seconds = time.monotonic() - begin
             self._progress.show(self._states.values(), is_last=True)
-            with contextlib.suppress(ValueError):
-                self._client.unsubscribe_topic(self._id)
+            if self._client.status == "running":
+                with contextlib.suppress(ValueError):
+                    self._client.unsubscribe_topic(self._id)
         return self.summary
 
     def _open_tasks(self) -> list[Task]:
         return [state.task for state in self._states.values() if state.phase.is_open]
+
+    def _look_at_clock(self) -> None:
+        """Does what is due, from time to time: it takes a look at every task."""
+        now = time.monotonic()
+        if now >= self._next_look_s:
+            self._next_look_s = now + LOOK_INTERVAL_S
+            self._repeat_due_tasks()
+            self._end_overdue_tasks()
+            self._look_for_workers(now)
+            self._progress.show(self._states.values())
+
+    def _look_for_workers(self, now: float) -> None:
+        """Gives up a cluster that has lost all workers, and gets none."""
+        if now < self._next_worker_look_s:
+            return
+        self._next_worker_look_s = now + WORKER_LOOK_INTERVAL_S
+        if self._client.nthreads():
+            self._last_worker_s = now
+        elif now - self._last_worker_s > self._options.worker_timeout_seconds:
+            raise ClusterError(
+                f"the cluster has had no worker for {now - self._last_worker_s:.0f} s"
+            )
+        else:
+            self._progress.note("the cluster has no worker; waiting for one")
+
+    def _end(self, state: TaskState, phase: Phase) -> None:
+        state.end(phase)
+        self._open.discard(state.task.id)
 
     def _wait_for_worker(self) -> None:
         limit = self._options.worker_timeout_seconds
@@ -174,7 +210,7 @@ class JobRun:
     def _handle_events(self) -> None:
         """Waits for an event, and handles all that are there."""
         with contextlib.suppress(queue.Empty):
-            event = self._events.get(timeout=MAX_WAIT_S)
+            event = self._events.get(timeout=LOOK_INTERVAL_S)
             while True:
                 if isinstance(event, _Settled):
                     self._handle_settled(event)
@@ -239,14 +275,14 @@ class JobRun:
         name = state.task.id
         if outcome.code == DONE:
             if outcome.has_run:
-                state.end(Phase.DONE)
+                self._end(state, Phase.DONE)
                 self.summary.done.append(name)
                 self._progress.finished(state, outcome.seconds)
             else:
-                state.end(Phase.UP_TO_DATE)
+                self._end(state, Phase.UP_TO_DATE)
                 self.summary.up_to_date.append(name)
         elif outcome.code == NOT_USABLE:
-            state.end(Phase.NOT_USABLE)
+            self._end(state, Phase.NOT_USABLE)
             self.summary.not_usable.append(name)
             self._progress.note(f"{name}: done, but the result may not be used")
             self._skip_dependants(state.task)
@@ -335,7 +371,7 @@ class JobRun:
                 state.phase, state.worker = Phase.WAITING, ""
 
     def _fail(self, state: TaskState, code: int | None, message: str, log: str) -> None:
-        state.end(Phase.FAILED)
+        self._end(state, Phase.FAILED)
         failure = Failure(state.task.id, code, message, log, f"logs/{state.task.id}.log")
         self.summary.failed.append(failure)
         self._progress.note(f"{state.task.id}: failed: {message}")
@@ -345,7 +381,7 @@ class JobRun:
         for later in self._graph.dependants(task.id):
             state = self._states[later.id]
             if state.phase.is_open:
-                state.end(Phase.SKIPPED)
+                self._end(state, Phase.SKIPPED)
                 self.summary.skipped.append(Skip(later.id, task.id))
 
     def _cancel(self) -> None:
