@@ -81,14 +81,15 @@ def fit_line(counts: list[int], seconds: list[float]) -> tuple[float, float]:
     return t_mean - slope * n_mean, slope
 
 
-def print_model(task_seconds: float) -> None:
+def print_model(task_seconds: float, start_seconds: float) -> None:
     """Prints time and bottleneck of large networks."""
     work = FRAMES_OF_SECTION * FRAME_PROCESSOR_SECONDS
     print(
         f"\nModel: sections of {FRAMES_OF_SECTION} frames, {STEPS_OF_SECTION} tasks each; "
         f"{FRAME_PROCESSOR_SECONDS:.2f} core seconds a frame on any number of workers;\n"
-        f"tasks of {CORES_OF_TASK} cores; one scheduler, {1e3 * task_seconds:.2f} ms a task; "
-        f"a worker lost every {CORE_SECONDS_OF_LOSS / 86400:.0f} core days.\n"
+        f"tasks of {CORES_OF_TASK} cores; {1e3 * start_seconds:.0f} ms of a worker to start one; "
+        f"one scheduler, {1e3 * task_seconds:.2f} ms a task;\n"
+        f"a worker lost every {CORE_SECONDS_OF_LOSS / 86400:.0f} core days. "
         "Storage keeps up, and the last section ends with the others. The longest of the times\n"
         "is that of the job: work, scheduler (one process), or one section from start to end."
     )
@@ -97,8 +98,9 @@ def print_model(task_seconds: float) -> None:
         sections = frames / FRAMES_OF_SECTION
         for cores in (100, 1000, 10_000):
             repeated = work / 2 / CORE_SECONDS_OF_LOSS
+            start = STEPS_OF_SECTION * start_seconds * CORES_OF_TASK
             times = {
-                "work": sections * work * (1 + repeated) / cores,
+                "work": sections * (work * (1 + repeated) + start) / cores,
                 "scheduler": sections * STEPS_OF_SECTION * task_seconds,
                 "section": work / CORES_OF_TASK,
             }
@@ -115,7 +117,9 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     choices = parser.parse_args()
     print(f"{os.cpu_count()} cores, {choices.workers} workers of 1 thread")
-    print(f"{'tasks':>6} {'time':>9} {'client + scheduler':>19} {'a task':>9}")
+    print(
+        f"{'tasks':>6} {'time':>9} {'client + scheduler':>19} {'a task':>9} {'worker a task':>14}"
+    )
     processors = []
     with (
         LocalCluster(
@@ -128,13 +132,15 @@ def main() -> None:
             runs = [measure(client, count) for _ in range(choices.repeats)]
             seconds, processor = (statistics.median(column) for column in zip(*runs, strict=True))
             processors.append(processor)
+            start_seconds = choices.workers * seconds / count
             print(
                 f"{count:>6} {seconds:>7.2f} s {processor:>17.2f} s "
-                f"{1e3 * processor / count:>6.2f} ms"
+                f"{1e3 * processor / count:>6.2f} ms "
+                f"{1e3 * start_seconds:>11.0f} ms"
             )
     start, slope = fit_line(choices.tasks, processors)
     print(f"fit: {1e3 * start:.0f} ms + {1e3 * slope:.2f} ms a task")
-    print_model(slope)
+    print_model(slope, start_seconds)
 
 
 if __name__ == "__main__":

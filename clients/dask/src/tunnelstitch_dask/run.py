@@ -30,6 +30,8 @@ from .state import Phase, TaskState
 from .summary import Failure, Retry, Skip, Summary
 from .worker import Call, end_tasks, run_task
 
+# The remedy where Dask itself cannot run a task.
+INSTALLED = "install tunnelstitch-dask in one version with the client, scheduler and workers"
 # Longest pause before another attempt, seconds.
 MAX_BACKOFF_S = 60.0
 # Time between two looks at all tasks, seconds.
@@ -248,17 +250,14 @@ class JobRun:
             else:
                 self._repeat_without_outcome(state)
         except Exception as error:
-            self._fail(state, None, f"{type(error).__name__}: {error}", "")
+            self._fail(state, None, f"{type(error).__name__}: {error}; {INSTALLED}", "")
         else:
             self._end_attempt(state, outcome)
 
     def _handle_cancelled(self, error: CancelledError) -> None:
         """Submits everything again if the scheduler is back."""
         if getattr(error, "reason", "") != "scheduler-connection-lost":
-            raise ClusterError(
-                f"the scheduler refused a task: {error}; tunnelstitch-dask has to be installed in "
-                "the same version where the scheduler and the workers run"
-            )
+            raise ClusterError(f"the scheduler refused a task: {error}; {INSTALLED}")
         while self._client.status == "connecting":
             time.sleep(0.1)
         if self._client.status != "running":
