@@ -89,9 +89,9 @@ def print_model(task_seconds: float, start_seconds: float) -> None:
         f"{FRAME_PROCESSOR_SECONDS:.2f} core seconds a frame on any number of workers;\n"
         f"tasks of {CORES_OF_TASK} cores; {1e3 * start_seconds:.0f} ms of a worker to start one; "
         f"one scheduler, {1e3 * task_seconds:.2f} ms a task;\n"
-        f"a worker lost every {CORE_SECONDS_OF_LOSS / 86400:.0f} core days. "
-        "Storage keeps up, and the last section ends with the others. The longest of the times\n"
-        "is that of the job: work, scheduler (one process), or one section from start to end."
+        f"a worker lost every {CORE_SECONDS_OF_LOSS / 86400:.0f} core days.\n"
+        "Storage keeps up, and the last section ends with the others. The longest of the times is\n"
+        "that of the job: work, scheduler (one process), or one section from start to end."
     )
     print(f"{'frames':>12} {'cores':>7} {'work':>10} {'scheduler':>10} {'section':>9}  bottleneck")
     for frames in (10**6, 10**8):
