@@ -51,6 +51,8 @@ pub fn read_records(folder: &Path, job: &Job) -> Result<Vec<Option<TaskRecord>>,
 /// used; the same task running already; a command that fails.
 pub fn run_task(folder: &Path, job: &Job, id: &str, program: &Path) -> Result<DoneTask, JobError> {
     let task = job.task(folder, id)?;
+    // Before any input is read, which may take long.
+    let _lock = lock(folder, task)?;
     let mut keys = TaskKeys::new(folder, job);
     for after in &task.after {
         let before = job.task(folder, after)?;
@@ -63,7 +65,6 @@ pub fn run_task(folder: &Path, job: &Job, id: &str, program: &Path) -> Result<Do
         }
     }
     let key = keys.of(task)?;
-    let _lock = lock(folder, task)?;
     if let Some(record) = done(folder, task, &key)? {
         return Ok(DoneTask {
             record,
