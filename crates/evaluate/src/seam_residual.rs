@@ -159,7 +159,6 @@ fn sample_frames(
     grid: &Canvas,
     tile: &Tile,
 ) -> Vec<RunningVariance> {
-    let camera = frames.camera();
     let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
     let points = tile.points(surface, grid);
     let mut seen = vec![RunningVariance::default(); points.len()];
@@ -168,7 +167,7 @@ fn sample_frames(
             continue;
         };
         let pose = &placements[*frame].pose;
-        let camera = placements[*frame].camera(camera);
+        let camera = placements[*frame].camera(frames.cameras().of(*frame));
         for (x_w, seen) in points.iter().zip(&mut seen) {
             let pixel = camera
                 .project(&pose.to_camera(x_w))

@@ -6,7 +6,7 @@ use crate::error_statistics::{ErrorStatistics, root_mean_square};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::{Camera, Cameras};
 use tunnelstitch_geometry::surface::{
     Surface, SurfaceError, gauge_component, shortest_arc, sighted_wall, viewing_distance,
 };
@@ -51,16 +51,17 @@ pub struct WallError {
 /// wall.
 pub fn wall_error(
     surface: &dyn Surface,
-    camera: &Camera,
+    cameras: impl Into<Cameras>,
     estimated: &[Pose],
     truth: &[Pose],
 ) -> Result<WallError, EvaluateError> {
+    let cameras = cameras.into();
     check_pairs(estimated.len(), truth.len())?;
     let perimeter_m = surface.perimeter_m();
     let (mut delta_s, mut delta_h, mut pixel_m) = (Vec::new(), Vec::new(), Vec::new());
     let mut ends = Vec::new();
     for (frame, (estimate, truth)) in estimated.iter().zip(truth).enumerate() {
-        let offsets = frame_offsets(surface, camera, frame, estimate, truth)?;
+        let offsets = frame_offsets(surface, cameras.of(frame), frame, estimate, truth)?;
         delta_s.extend(offsets.delta_s_m);
         delta_h.extend(offsets.delta_h_m);
         pixel_m.resize(delta_s.len(), offsets.pixel_m);

@@ -3,7 +3,7 @@
 use crate::error::EvaluateError;
 use crate::error::check_pairs;
 use crate::wall_error::{FrameOffsets, frame_offsets, mean_arc};
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::surface::{Surface, shortest_arc};
 use tunnelstitch_geometry::trajectory::Pose;
 use tunnelstitch_refine::{FrameFlag, FrameReport};
@@ -64,11 +64,12 @@ impl MajorityError {
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`].
 pub fn majority_error(
     surface: &dyn Surface,
-    camera: &Camera,
+    cameras: impl Into<Cameras>,
     estimated: &[Pose],
     truth: &[Pose],
 ) -> Result<MajorityError, EvaluateError> {
     check_pairs(estimated.len(), truth.len())?;
+    let cameras = cameras.into();
     // True poses are inside and look at the wall, or there would be no images. Only an estimated
     // pose can miss the wall.
     let offsets: Vec<Option<FrameOffsets>> = estimated
@@ -76,7 +77,7 @@ pub fn majority_error(
         .zip(truth)
         .enumerate()
         .map(|(frame, (estimate, truth))| {
-            frame_offsets(surface, camera, frame, estimate, truth).ok()
+            frame_offsets(surface, cameras.of(frame), frame, estimate, truth).ok()
         })
         .collect();
     let frames = AllOffsets {
@@ -179,6 +180,7 @@ impl AllOffsets<'_> {
 mod tests {
     use super::*;
     use crate::wall_error::wall_error;
+    use tunnelstitch_geometry::camera::Camera;
     use tunnelstitch_geometry::surface::{Circle, GaugeMotion};
     use tunnelstitch_geometry::trajectory::spiral;
 

@@ -109,7 +109,7 @@ impl Ring {
     ) -> PhotometricProblem<'_> {
         let context = EstimationContext {
             shape,
-            calibration: self.calibration,
+            calibration: self.calibration.clone(),
             ..test_context(&self.wall, &self.frames, &self.prior)
         };
         let all = 0..self.estimates.len();

@@ -161,8 +161,8 @@ fn judge(
     sigmas: &[FrameSigma],
     rejections: &mut [Option<RejectionReason>],
 ) {
-    let camera = &setup.input.camera;
-    let all_pixels = f64::from(camera.width) * f64::from(camera.height);
+    let [width, height] = setup.input.cameras.size().map(f64::from);
+    let all_pixels = width * height;
     for (k, rejection) in rejections.iter_mut().enumerate() {
         let evidence = FrameEvidence {
             rejection: rejection.take(),

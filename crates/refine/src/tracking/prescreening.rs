@@ -123,10 +123,12 @@ fn rms_difference(a: &GreyImage, b: &GreyImage) -> f64 {
 /// picture by more than a pixel of the coarsest level, where pictures are compared.
 fn has_moved(context: &EstimationContext, a: usize, b: usize, coarsest: usize) -> bool {
     let (from, to) = (&context.prior.initial[a], &context.prior.initial[b]);
-    let Ok(distance_m) = viewing_distance(context.surface.as_ref(), &context.camera, from) else {
+    let Ok(distance_m) = viewing_distance(context.surface.as_ref(), context.cameras.of(a), from)
+    else {
         return true;
     };
     let rotation = from.r_wc.angle_to(&to.r_wc);
     let translation = (to.t_wc - from.t_wc).norm() / distance_m;
-    (rotation + translation) * context.camera.vertical_focal_px() > 2f64.powi(coarsest as i32)
+    (rotation + translation) * context.cameras.of(a).vertical_focal_px()
+        > 2f64.powi(coarsest as i32)
 }

@@ -129,7 +129,7 @@ impl SolutionUncertainty {
         let frames = self.covariances.frames.len();
         let wall_variance = |hit: &Hit, frame: &WallFrame| {
             let total = self.total.as_ref()?;
-            let pixel = pixel_jacobians(context, &estimate.pose, hit.wall, frame);
+            let pixel = pixel_jacobians(context, (k, &estimate.pose), hit.wall, frame);
             let mut point = PointJacobians::default();
             point.add_pixel(k, &pixel, 1.0);
             let model = context.shape.as_ref().map(|shape| &shape.model);
@@ -140,7 +140,7 @@ impl SolutionUncertainty {
             registration_px: self.registration_px[k],
             ..compute_frame_sigma_by(
                 context.surface.as_ref(),
-                &context.camera,
+                context.cameras.of(k),
                 estimate,
                 &self.covariances.frames[k],
                 wall_variance,

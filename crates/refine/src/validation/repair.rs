@@ -39,7 +39,7 @@ pub fn repair(
     progress: &dyn Progress,
 ) -> Result<Vec<AliasHypothesis>, ProblemError> {
     let count = states.estimates.len();
-    let finest = options.handover_level(context.camera.shorter_side());
+    let finest = options.handover_level(context.cameras.shorter_side());
     progress.start("repair", MAX_ITERATIONS);
     let mut alignments = align_pairs(context, finest, states, &(0..count))?;
     let mut best: Option<FrameStates> = None;
@@ -99,7 +99,7 @@ fn solve_neighbourhoods(
     states: &mut FrameStates,
     solved: &mut FrameStates,
 ) -> Result<(), ProblemError> {
-    let side = context.camera.shorter_side();
+    let side = context.cameras.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
     let count = states.estimates.len();
     let mut shares = Vec::new();
