@@ -59,16 +59,22 @@ fn a_rig_is_refined_with_a_mount_that_is_a_little_wrong() {
     let [refined_0, truth_0] = [poses_of(&refined), truth].map(|poses| own(poses, 0));
     let surface = opened.surface.as_ref();
     let error = wall_error(surface, opened.cameras.of(0), &refined_0, &truth_0).unwrap();
-    assert!(error.px.rms < 0.08, "{}", error.px.rms);
+    let stated = frames
+        .iter()
+        .map(|frame| frame["sigma"]["wall_px"].as_f64());
+    let stated_px = stated.map(Option::unwrap).sum::<f64>() / 24.0;
+    // A single camera leaves 0.9 px in its only turn, and says so.
+    assert!(stated_px < 0.2, "{stated_px}");
+    assert!(error.px.rms < 1.5 * stated_px, "{}", error.px.rms);
 
     let bodies = tum::read(&out.join("poses_body.tum")).unwrap();
     assert_eq!((refined.len(), bodies.len()), (24, 12));
     for poses in ["poses.tum", "poses_body.tum"] {
-        let panorama = dir.path().join("panorama.png");
+        let panorama = dir.path().join(poses).with_extension("png");
         let poses = out.join(poses);
         let stitch = ["stitch", text(&survey), "--poses", text(&poses)];
         let drawn = ["--px-per-metre", "10", "--out", text(&panorama), "--quiet"];
-        succeed(&[&stitch[..], &drawn[..], &["--force"]].concat());
+        succeed(&[&stitch[..], &drawn[..]].concat());
     }
     let compared = dir.path().join("compared");
     let compare = ["compare", text(&survey), "--refined", text(&out), "--quiet"];
@@ -77,8 +83,9 @@ fn a_rig_is_refined_with_a_mount_that_is_a_little_wrong() {
     let errors = json(&compared.join("compare.json"));
     let frames = errors["refined"]["wall"]["frame_rms_px"].as_array();
     assert_eq!(frames.map(Vec::len), Some(24));
-    let located = ["locate", text(&survey), "--poses", text(&out), "--frame"];
-    let located = succeed(&[&located[..], &["camera1/000003.png:80,60"]].concat());
+    let poses = out.join("poses.tum");
+    let located = ["locate", text(&survey), "--poses", text(&poses), "--frame"];
+    let located = succeed(&[&located[..], &["camera1/000003.png,80,60"]].concat());
     assert!(located.contains("camera1/000003.png"), "{located}");
     // A table with the names of the pictures.
     let table = dir.path().join("poses.csv");

@@ -252,7 +252,7 @@ mod tests {
         let stack = pictures(&wall);
         let residual = |poses: &[tunnelstitch_geometry::trajectory::Pose]| {
             let placements =
-                place_frames(&wall.circle, &wall.camera, poses, &Shutter::default()).unwrap();
+                place_frames(&wall.circle, wall.camera, poses, &Shutter::default()).unwrap();
             let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
             seam_residual(&wall.circle, &stack, &placements, &canvas).unwrap()
         };
@@ -271,7 +271,7 @@ mod tests {
         let flat = |value| Picture::new(w, h, 1, vec![value; w * h]);
         let poses = vec![wall.poses[0]; 3];
         let placements =
-            place_frames(&wall.circle, &wall.camera, &poses, &Shutter::default()).unwrap();
+            place_frames(&wall.circle, wall.camera, &poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
         let of = |values: &[u8]| {
             let pictures: Vec<Picture> = values.iter().map(|value| flat(*value)).collect();
@@ -293,7 +293,7 @@ mod tests {
         let mut wrong = wall.poses.clone();
         wrong[4].t_wc.y += 0.05;
         let placements =
-            place_frames(&wall.circle, &wall.camera, &wrong, &Shutter::default()).unwrap();
+            place_frames(&wall.circle, wall.camera, &wrong, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
         let map = SeamMap::new(&wall.circle, &pictures(&wall), &placements, &canvas);
         let [around, along] = map.size();

@@ -201,7 +201,7 @@ mod tests {
         let (circle, camera, truth) = scene();
         for alpha_rad in [0.3, 3.1, -3.1] {
             let gauge = GaugeMotion::about_y(alpha_rad, -7.0);
-            let error = wall_error(&circle, &camera, &gauge.apply_all(&truth), &truth).unwrap();
+            let error = wall_error(&circle, camera, &gauge.apply_all(&truth), &truth).unwrap();
             assert!(error.mm.max < 1e-6, "{}", error.mm.max);
             assert!((error.shift_s_m - 3.0 * alpha_rad).abs() < 1e-9);
             assert!((error.shift_h_m + 7.0).abs() < 1e-9);
@@ -213,7 +213,7 @@ mod tests {
         let (circle, camera, truth) = scene();
         let mut estimated = truth.clone();
         estimated[5].t_wc.y += 0.024;
-        let error = wall_error(&circle, &camera, &estimated, &truth).unwrap();
+        let error = wall_error(&circle, camera, &estimated, &truth).unwrap();
         // The mean shift of 1 mm is removed everywhere.
         assert!((error.frame_rms_mm[5] - 23.0).abs() < 1e-6);
         assert!((error.mm.median - 1.0).abs() < 1e-6);
@@ -230,7 +230,7 @@ mod tests {
         let (circle, camera, truth) = scene();
         let mut estimated = truth.clone();
         estimated[2].t_wc.x = 5.0;
-        let message = wall_error(&circle, &camera, &estimated, &truth)
+        let message = wall_error(&circle, camera, &estimated, &truth)
             .unwrap_err()
             .to_string();
         assert!(message.contains("frame 2, estimated pose"), "{message}");

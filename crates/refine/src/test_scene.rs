@@ -107,7 +107,7 @@ pub fn test_context<'a>(
         ignored: &NO_PATCHES,
         cameras: wall.camera.into(),
         shutter: &GLOBAL_SHUTTER,
-        calibration: Calibration::none(&wall.camera),
+        calibration: Calibration::none(wall.camera),
         kappa: Kappa::zeros(),
         frames,
         prior,

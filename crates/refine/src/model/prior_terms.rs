@@ -184,7 +184,7 @@ pub mod tests {
     pub fn calibration() -> Calibration {
         Calibration {
             middle_h_m: 0.4,
-            ..Calibration::none(&Camera::from_vertical_fov(16, 16, 1.0))
+            ..Calibration::none(Camera::from_vertical_fov(16, 16, 1.0))
         }
     }
 

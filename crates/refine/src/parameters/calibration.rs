@@ -348,7 +348,7 @@ mod tests {
     fn calibration() -> Calibration {
         Calibration {
             middle_h_m: 4.0,
-            ..Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0))
+            ..Calibration::none(Camera::from_vertical_fov(160, 120, 1.0))
         }
     }
 

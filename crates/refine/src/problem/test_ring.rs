@@ -56,7 +56,7 @@ impl Ring {
             calibration: Calibration {
                 free: [true; SHARED_PARAMETERS],
                 sigma: Kappa::repeat(1.0),
-                ..Calibration::none(&wall.camera)
+                ..Calibration::none(wall.camera)
             },
             wall,
             frames: FrameCache::of_pyramids(frames),

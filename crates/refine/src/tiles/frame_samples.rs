@@ -332,7 +332,7 @@ mod tests {
     #[test]
     fn shared_jacobian_matches_central_differences() {
         let circle = Circle::new(3.0).unwrap();
-        let calibration = Calibration::none(&Camera {
+        let calibration = Calibration::none(Camera {
             lens: Lens::radial(-0.1, 0.02),
             ..Camera::from_vertical_fov(160, 120, 60f64.to_radians())
         });

@@ -92,7 +92,7 @@ mod tests {
                 fy: factor * wall.camera.fy,
                 ..wall.camera
             };
-            let mut calibration = Calibration::none(&given);
+            let mut calibration = Calibration::none(given);
             calibration.free[FOCAL_INDEX] = true;
             calibration.sigma[FOCAL_INDEX] = sigma;
             let context = EstimationContext {

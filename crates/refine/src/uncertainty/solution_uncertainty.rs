@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn all_free_parameters_are_marked() {
-        let mut calibration = Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0));
+        let mut calibration = Calibration::none(Camera::from_vertical_fov(160, 120, 1.0));
         calibration.sigma = Kappa::repeat(0.1);
         calibration.free[3] = true;
         let unobservable = mark_all_unobservable(&calibration, "because");

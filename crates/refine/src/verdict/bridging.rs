@@ -162,7 +162,7 @@ mod tests {
     }
 
     fn bridge(prior: &Prior, photometric: [bool; 9]) -> (Vec<Pose>, Vec<Matrix6<f64>>) {
-        let calibration = Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0));
+        let calibration = Calibration::none(Camera::from_vertical_fov(160, 120, 1.0));
         // Photometric frames lie 1 cm more to the side with each step, the others anywhere.
         let mut estimates: Vec<_> = (0..9)
             .map(|k| {

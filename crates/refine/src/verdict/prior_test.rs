@@ -385,7 +385,7 @@ mod tests {
             next: vec![Matrix6::zeros(); COUNT - 1],
             variance_factor: 1.0,
         };
-        let calibration = Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0));
+        let calibration = Calibration::none(Camera::from_vertical_fov(160, 120, 1.0));
         let datum = calibration.datum(&Kappa::zeros());
         PriorTest::new(
             prior,

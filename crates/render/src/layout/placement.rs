@@ -100,7 +100,7 @@ mod tests {
     fn native_resolution_is_focal_length_over_distance() {
         let circle = Circle::new(3.0).unwrap();
         let poses = [facing(Vector3::zeros()), facing(Vector3::y())];
-        let ppm = native_px_per_metre(&circle, &camera(), &poses).unwrap();
+        let ppm = native_px_per_metre(&circle, camera(), &poses).unwrap();
         assert!((ppm - camera().fx / 3.0).abs() < 1e-9);
     }
 
@@ -111,7 +111,7 @@ mod tests {
             facing(Vector3::zeros()),
             facing(Vector3::x() * (-TAU / 4.0)),
         ];
-        let message = place_frames(&circle, &camera(), &poses, &Shutter::default())
+        let message = place_frames(&circle, camera(), &poses, &Shutter::default())
             .unwrap_err()
             .to_string();
         for part in ["frame 1", "vanishing point", "check its pose"] {

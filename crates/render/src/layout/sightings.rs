@@ -104,14 +104,14 @@ mod tests {
     }
 
     fn look_at_points(wall: &TestWall, shutter: &Shutter) {
-        let placements = place_frames(&wall.circle, &wall.camera, &wall.poses, shutter).unwrap();
+        let placements = place_frames(&wall.circle, wall.camera, &wall.poses, shutter).unwrap();
         let mut seen = 0;
         for k in 0..40 {
             let point = WallPoint {
                 s_m: wall.perimeter_m() * f64::from(k) / 40.0,
                 h_m: 0.2 + 0.1 * (1.7 * f64::from(k)).sin(),
             };
-            let found = sightings(&wall.circle, &wall.camera, &Masks::NONE, &placements, point);
+            let found = sightings(&wall.circle, wall.camera, &Masks::NONE, &placements, point);
             assert!(found.is_sorted_by(|a, b| a.px_per_metre >= b.px_per_metre));
             for sighting in &found {
                 seen += 1;

@@ -301,7 +301,7 @@ mod tests {
             })
             .collect();
         let camera = Camera::from_vertical_fov(16, 16, 1.0);
-        let mut cache = PictureCache::open(&files.into(), &camera, 0).unwrap();
+        let mut cache = PictureCache::open(&files.into(), camera, 0).unwrap();
         let held = |cache: &PictureCache| -> Vec<usize> {
             (0..4).filter(|k| cache.picture(*k).is_some()).collect()
         };
@@ -327,7 +327,7 @@ mod tests {
             let path = folder.path().join(name);
             image::GrayImage::new(64, 64).save(&path).unwrap();
             let files = vec![FrameFile::picture(0, path)].into();
-            let cache = PictureCache::open(&files, &camera, 0).unwrap();
+            let cache = PictureCache::open(&files, camera, 0).unwrap();
             assert_eq!(cache.is_compressed(), compressed, "{name}");
         }
     }
