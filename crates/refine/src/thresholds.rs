@@ -61,8 +61,8 @@ pub mod tracking {
     /// Chosen by: three turns of 120°: a wrong frame spoils its neighbours within a turn.
     pub const MAX_FAILURES: usize = 12;
 
-    /// 1-σ of the place of a registered frame over that of a step, by which the cameras of a rig are
-    /// placed from each other before all frames are solved together.
+    /// 1-σ of the place of a registered frame over that of a step, by which the cameras of a rig
+    /// are placed from each other before all frames are solved together.
     ///
     /// Higher: cameras of a rig are searched for farther, in more time.
     ///

@@ -60,8 +60,8 @@ struct StoredFrames {
 }
 
 impl FrameCache {
-    /// Creates a cache of the `frames`, pictures of `size` (width and height, pixels), with `levels`
-    /// pyramid levels each, in at most `bytes` of memory, but at least one pyramid.
+    /// Creates a cache of the `frames`, pictures of `size` (width and height, pixels), with
+    /// `levels` pyramid levels each, in at most `bytes` of memory, but at least one pyramid.
     pub fn new(frames: &FrameSet, size: [u32; 2], levels: usize, bytes: usize) -> Self {
         let pixels = f64::from(size[0]) * f64::from(size[1]);
         let pyramids =

@@ -51,8 +51,8 @@ impl CameraSection {
         }
     }
 
-    /// Checks a camera that is none of a rig; `has_rig`: there is a section `[rig]`. Returns what is
-    /// wrong.
+    /// Checks a camera that is none of a rig; `has_rig`: there is a section `[rig]`. Returns what
+    /// is wrong.
     pub(super) fn check_single(&self, has_rig: bool) -> Result<(), &'static str> {
         if self.frames.is_some() {
             return Err(

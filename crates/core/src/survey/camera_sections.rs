@@ -116,11 +116,14 @@ mod tests {
 
     #[test]
     fn an_unknown_key_of_a_camera_is_named_where_it_stands() {
-        for text in ["[camera]\nfiel = 1\n", "[[camera]]\nfiel = 1\n"] {
+        for text in ["[camera]\nshutter = 1\n", "[[camera]]\nshutter = 1\n"] {
             let error = read(text).unwrap_err();
-            assert!(error.message().contains("unknown field `fiel`"), "{error}");
+            assert!(
+                error.message().contains("unknown field `shutter`"),
+                "{error}"
+            );
             let at = error.span().unwrap();
-            assert_eq!(&text[at], "fiel", "{text}");
+            assert_eq!(&text[at], "shutter", "{text}");
         }
         let error = read("camera = []\n").unwrap_err();
         assert!(error.message().contains("empty array"), "{error}");

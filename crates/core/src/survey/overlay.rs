@@ -70,8 +70,8 @@ impl OverlayReport {
 
 impl Survey {
     /// Finds the pixels that do not move with the wall, and whether the frames are interlaced, in
-    /// up to 64 frames; the pixels are not sought if `[frames] overlay` keeps them, if there are too
-    /// few frames between which the wall moves, or in frames of a rig.
+    /// up to 64 frames; the pixels are not sought if `[frames] overlay` keeps them, if there are
+    /// too few frames between which the wall moves, or in frames of a rig.
     ///
     /// # Errors
     /// A frame that cannot be read.

@@ -82,7 +82,7 @@ impl<'a> PoseReader<'a> {
         convention.axes = self.section.camera_axes.unwrap_or(convention.axes);
         convention.camera_in_body = self.camera_in_body;
         convention.tunnel_in_world = self.tunnel_in_world;
-        if file.format == PoseFormat::Euroc && convention.camera_in_body.is_none() {
+        if file.format == PoseFormat::Euroc && convention.camera_in_body.is_none() && !is_rig {
             return Err(SurveyError::Association {
                 path: file.path,
                 what: "holds the poses of a body (IMU), as EuRoC's files do; say how the camera \

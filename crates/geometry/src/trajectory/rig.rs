@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 
 /// Several cameras on one body, and the uncertainty of their places on it.
 ///
-/// Frames are in the order of their moments, and within a moment in that of the cameras, as those of
-/// [`crate::camera::Cameras`].
+/// Frames are in the order of their moments, and within a moment in that of the cameras, as those
+/// of [`crate::camera::Cameras`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// The pose of each camera in the body, `x_body = T x_camera`; at least one.
@@ -80,7 +80,7 @@ impl Rig {
             return Pose::identity();
         };
         let count = bodies.len() as f64;
-        // They differ by so little that the mean of their rotation vectors is that of the rotations.
+        // They differ by so little that the mean of their rotation vectors is that of rotations.
         let turn = |body: &Pose| so3::log(&(first.r_wc.inverse() * body.r_wc));
         let turn = bodies.iter().map(turn).sum::<Vector3<f64>>() / count;
         let shift = |body: &Pose| body.t_wc - first.t_wc;

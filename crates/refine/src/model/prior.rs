@@ -34,8 +34,8 @@ use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose, Rig, StampedP
 ///
 /// `R̂, t̂` are the initial poses transformed to the tunnel, and t is multiplied by the scale, both
 /// by the [`Datum`]. Σ is the diagonal variance of the jitter, for a step of a random walk times
-/// its [`Prior::step_ratio`], for a pose times its [`Prior::variance_ratios`]; that of a relation is
-/// the rig's.
+/// its [`Prior::step_ratio`], for a pose times its [`Prior::variance_ratios`]; that of a relation
+/// is the rig's.
 #[derive(Clone, Debug)]
 pub struct Prior {
     /// Noise model of the initial poses.

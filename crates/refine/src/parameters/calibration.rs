@@ -260,7 +260,7 @@ impl Calibration {
     }
 }
 
-/// True if a single camera has the intrinsic parameter: unless it is k1 or k2 and the lens has none.
+/// True if it is a single camera that has the parameter: unless it is k1 or k2 of a lens without.
 fn has_intrinsic(cameras: &Cameras, k: usize) -> bool {
     !cameras.is_rig() && (!DISTORTION_INDICES.contains(&k) || cameras.of(0).lens.has_k1_k2())
 }

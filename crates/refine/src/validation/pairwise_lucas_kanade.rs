@@ -103,7 +103,7 @@ mod tests {
 
     #[track_caller]
     fn assert_inconsistent(alignments: &[Alignment], frames: usize, expected: &[usize]) {
-        let found = find_inconsistent_frames(alignments, frames, &RefineOptions::default());
+        let found = find_inconsistent_frames(alignments, &[], frames, &RefineOptions::default());
         let found: Vec<usize> = found.into_iter().map(|(frame, _)| frame).collect();
         assert_eq!(found, expected, "{alignments:#?}");
     }

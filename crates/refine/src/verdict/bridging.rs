@@ -2,9 +2,9 @@
 //!
 //! A run of such frames between two photometric ones is where the prior puts it with both ends
 //! held: a random walk bridges the gap, with the error of the initial steps spread over it; with
-//! independent errors each frame stays at its initial pose, or where the relation of a rig puts it from another
-//! one of its moment. Without photometric frames all keep
-//! their initial poses. No frame that does not know its place moves another, or is moved.
+//! independent errors each frame stays at its initial pose, or where the relation of a rig puts it
+//! from another one of its moment. Without photometric frames all keep their initial poses. No
+//! frame that does not know its place moves another, or is moved.
 
 use crate::linear::normal_equations::{NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;

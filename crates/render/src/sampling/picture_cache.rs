@@ -27,8 +27,8 @@ pub struct PictureCache {
 /// Largest share of their pictures' bytes at which files count as compressed.
 const MAX_COMPRESSED_SHARE: f64 = 0.9;
 
-/// Halvings of frames of resolution `native_px_per_metre`, whose shorter side has `side` pixels, before they are coarser than a canvas of
-/// `px_per_metre`: a canvas much coarser than the frames would otherwise pick single pixels out of
+/// Halvings of frames of resolution `native_px_per_metre`, whose shorter side has `side` pixels,
+/// before they are coarser than a canvas of `px_per_metre`: a canvas much coarser than the frames would otherwise pick single pixels out of
 /// them.
 pub fn level_for(side: u32, native_px_per_metre: f64, px_per_metre: f64) -> usize {
     let mut level = 0;

@@ -104,7 +104,8 @@ impl PanoramaFiles {
 
     /// Adds all files to a set of outputs.
     ///
-    /// `cameras` are those of the frames at full size, `covariances` those of their poses, if known.
+    /// `cameras` are those of the frames at full size, `covariances` those of their poses, if
+    /// known.
     ///
     /// # Errors
     /// Whatever the system says.
