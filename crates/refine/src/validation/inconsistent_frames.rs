@@ -3,8 +3,8 @@
 //! A frame is an inlier if it is aligned with every inlier that it shares wall with, and if such
 //! pairs tie it to the others. Agreement of neighbours is not enough: a group of frames can be
 //! right in itself and stand in the wrong place, if all that it shares with the others is a strip
-//! without texture, or the prior. The relation of a rig's cameras ties them as a pair does, if it is
-//! known as well.
+//! without texture, or the prior. The relation of a rig's cameras ties them as a pair does, if it
+//! is known as well.
 
 use crate::model::context::EstimationContext;
 use crate::model::rejection::RejectionReason;
@@ -109,8 +109,8 @@ pub fn find_inconsistent_frames(
     rejections
 }
 
-/// Pairs of frames of one moment whose relation is known well enough to tie them: if its σ displaces
-/// the wall in the picture by no more than [`MAX_TYING_SIGMA_PX`].
+/// Pairs of frames of one moment whose relation is known well enough to tie them: if its σ
+/// displaces the wall in the picture by no more than [`MAX_TYING_SIGMA_PX`].
 pub fn relation_ties(context: &EstimationContext) -> Vec<(usize, usize)> {
     let Some(rig) = &context.prior.rig else {
         return Vec::new();

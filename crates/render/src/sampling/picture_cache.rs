@@ -28,8 +28,8 @@ pub struct PictureCache {
 const MAX_COMPRESSED_SHARE: f64 = 0.9;
 
 /// Halvings of frames of resolution `native_px_per_metre`, whose shorter side has `side` pixels,
-/// before they are coarser than a canvas of `px_per_metre`: a canvas much coarser than the frames would otherwise pick single pixels out of
-/// them.
+/// before they are coarser than a canvas of `px_per_metre`: a canvas much coarser than the frames
+/// would otherwise pick single pixels out of them.
 pub fn level_for(side: u32, native_px_per_metre: f64, px_per_metre: f64) -> usize {
     let mut level = 0;
     while native_px_per_metre * 0.5f64.powi(level as i32 + 1) >= px_per_metre
