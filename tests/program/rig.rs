@@ -93,7 +93,7 @@ fn a_rig_is_refined_with_a_mount_that_is_a_little_wrong() {
         "convert",
         text(&survey),
         "--poses",
-        text(&out),
+        text(&poses),
         "--to",
         "csv",
     ];

@@ -87,7 +87,8 @@ pub struct SimulateArguments {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "fov_deg", "k1", "k2"])]
     camera: Option<PathBuf>,
     /// Number of cameras of a rig: each takes a frame at every moment, and --frames counts the
-    /// moments. They are spread about the carrier's axis and differ a little; the poses are those
+    /// moments. They are spread about the carrier's axis (with --view forward about the vertical of
+    /// the picture, so that the second of two looks back) and differ a little; the poses are those
     /// of the rig's body, and survey.toml has a table [[camera]] for each.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=16))]
     rig: Option<u32>,
