@@ -89,7 +89,7 @@ pub struct SimulateArguments {
     /// Number of cameras of a rig: each takes a frame at every moment, and --frames counts the
     /// moments. They are spread about the carrier's axis (with --view forward about the vertical of
     /// the picture, so that the second of two looks back) and differ a little; the poses are those
-    /// of the rig's body, and survey.toml has a table [[camera]] for each.
+    /// of the rig's body, and survey.toml has a table of each camera.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=16))]
     rig: Option<u32>,
     /// Angle between the first and the last camera of the rig, degrees [default: all around].
