@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let refined = refine(&survey, &RefineOptions::default(), &silent)?;
         let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
         let poses = poses_of(&refined.trajectory);
-        let error = majority_error(survey.surface.as_ref(), &survey.camera, &poses, &truth)?;
+        let error = majority_error(survey.surface.as_ref(), &survey.cameras, &poses, &truth)?;
         let frames = &refined.report.frames;
         let photometric = (frames.iter().zip(&error.frame_rms_px))
             .filter(|(frame, _)| frame.flag == FrameFlag::Photometric)

@@ -20,8 +20,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!(
         "{} frames of {} × {} px, {} threads, {REPETITIONS} rounds",
         survey.frames.len(),
-        survey.camera.width,
-        survey.camera.height,
+        survey.cameras.size()[0],
+        survey.cameras.size()[1],
         rayon::current_num_threads()
     );
     measure(&survey, "refine", &RefineOptions::default())?;

@@ -136,7 +136,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let advance_m = 2.0 * RADIUS_M * (0.5 * FOV_DEG.to_radians()).tan() / FRAMES_AROUND as f64;
     let placements = place_frames(
         &circle,
-        &camera,
+        camera,
         &spiral(FRAMES, advance_m, TAU / FRAMES_AROUND as f64),
         &Shutter::default(),
     )?;

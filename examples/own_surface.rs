@@ -116,7 +116,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let frames = FrameSet::in_memory(pictures);
     let options = StitchOptions::default();
     let shutter = Shutter::default();
-    let panorama = stitch(&pipe, &camera, &frames, &poses, &shutter, &options, &Silent)?;
+    let panorama = stitch(&pipe, camera, &frames, &poses, &shutter, &options, &Silent)?;
     println!(
         "{:.0} % of the panorama is covered",
         100.0 * panorama.coverage()

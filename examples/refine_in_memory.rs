@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("initial", plan),
         ("refined", poses_of(&refined.trajectory)),
     ] {
-        let error = wall_error(&pipe, &camera, &poses, &truth)?;
+        let error = wall_error(&pipe, camera, &poses, &truth)?;
         println!("{name} poses: {:.4} px RMS on the wall", error.px.rms);
     }
     let sigma = &refined.report.frames[23].sigma;

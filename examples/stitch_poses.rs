@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (name, poses) in sets {
         let panorama = stitch(
             survey.surface.as_ref(),
-            &survey.camera,
+            &survey.cameras,
             &survey.frames,
             &poses,
             &survey.shutter(),

@@ -24,7 +24,7 @@
 //! let frames = FrameSet::in_memory(pictures.collect::<Result<Vec<_>, _>>()?);
 //!
 //! let input = RefineInput::new(
-//!     survey.camera,
+//!     survey.cameras.clone(),
 //!     Arc::clone(&survey.surface),
 //!     &frames,
 //!     &survey.initial[..14],
@@ -108,7 +108,7 @@
 //!
 //! let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
 //! let off = |poses: &[_]| {
-//!     wall_error(survey.surface.as_ref(), &survey.camera, poses, &truth).map(|error| error.px.rms)
+//!     wall_error(survey.surface.as_ref(), &survey.cameras, poses, &truth).map(|error| error.px.rms)
 //! };
 //! assert!(off(&survey.initial_poses())? > 10.0);
 //! assert!(off(&poses_of(&refined.trajectory))? < 0.1);

@@ -40,7 +40,7 @@ impl Effort {
         let from_m = chainage().fold(f64::INFINITY, f64::min);
         let to_m = chainage().fold(f64::NEG_INFINITY, f64::max);
         // The panorama extends by half a frame beyond the first and the last camera.
-        let frame_m = f64::from(survey.camera.height) / px_per_metre;
+        let frame_m = f64::from(survey.cameras.size()[1]) / px_per_metre;
         let px = |metres: f64| (metres * px_per_metre).max(0.0) as u64;
         Self {
             refine_s: refine_s(survey, &RefineOptions::default()),
@@ -61,7 +61,8 @@ pub fn refine_s(survey: &Survey, options: &RefineOptions) -> f64 {
 /// Processor time of refine, seconds, within a factor of two or three.
 pub fn refine_processor_s(survey: &Survey, options: &RefineOptions) -> f64 {
     let frames = survey.frames.len() as f64;
-    let pixels = f64::from(survey.camera.width) * f64::from(survey.camera.height);
+    let [width, height] = survey.cameras.size().map(f64::from);
+    let pixels = width * height;
     let radius_m = survey.file.tunnel.nominal_m();
     let volume_deg3 = survey.prior.search_volume_deg3(radius_m);
     let search_s = TIME_PER_SEARCH_S * volume_deg3;
@@ -72,7 +73,8 @@ pub fn refine_processor_s(survey: &Survey, options: &RefineOptions) -> f64 {
 /// Memory of refine, bytes, beside what the program takes for any survey.
 pub fn refine_bytes(survey: &Survey) -> u64 {
     let frames = survey.frames.len() as f64;
-    let pixels = f64::from(survey.camera.width) * f64::from(survey.camera.height);
+    let [width, height] = survey.cameras.size().map(f64::from);
+    let pixels = width * height;
     let cache = RefineOptions::default().cache_bytes as f64;
     ((frames * PYRAMID_BYTES_PER_PIXEL * pixels).min(cache) + frames * EQUATION_BYTES_PER_FRAME)
         as u64

@@ -21,7 +21,7 @@ impl JitterCheck {
     /// independent.
     pub(super) fn of(survey: &Survey, px_per_metre: f64, overlap: &OverlapCheck) -> Self {
         let prior = &survey.prior;
-        let focal_px = survey.camera.focal_px();
+        let focal_px = survey.cameras.of(0).focal_px();
         let [x, y, z] = prior.translation_sigma_m;
         let shift_px = px_per_metre * y.max(x).max(z);
         let one_frame_px = (focal_px * prior.rotation_sigma_rad).hypot(shift_px);

@@ -36,10 +36,7 @@ impl MaskCheck {
         let points = around * along;
         let ignored = (0..points).filter(|k| survey.ignored.contains(&point(*k)));
         Self {
-            hidden_share: survey
-                .frames
-                .mask()
-                .map_or(0.0, |mask| mask.masked_fraction()),
+            hidden_share: survey.frames.masks().masked_fraction(),
             ignored: survey.file.tunnel.ignore.len(),
             ignored_share: ignored.count() as f64 / f64::from(points),
         }

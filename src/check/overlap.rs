@@ -12,7 +12,8 @@ use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 const MAX_MEASURED_FRAMES: usize = 200;
 /// Columns and rows of pixels of a frame that are projected into others.
 const GRID_PIXELS: [usize; 2] = [20, 15];
-/// Largest distance in the sequence between frames of one turn; others belong to another turn.
+/// Largest distance in the sequence between frames of one camera in one turn; others belong to
+/// another turn.
 const MAX_NEIGHBOUR_DISTANCE: usize = 3;
 
 /// Overlap of frames, medians over the frames. Pixels that the mask hides and ignored parts of the
@@ -20,7 +21,7 @@ const MAX_NEIGHBOUR_DISTANCE: usize = 3;
 #[derive(Clone, Copy, Debug, Serialize)]
 #[non_exhaustive]
 pub struct OverlapCheck {
-    /// Share of a frame that the next one also shows, 0–1.
+    /// Share of a frame that the next one of its camera also shows, 0–1.
     pub neighbours: f64,
     /// Smallest overlap of neighbours, 0–1.
     pub least_neighbours: f64,
@@ -51,34 +52,40 @@ fn shared_sides(a: &Footprint, b: &Footprint, perimeter_m: f64) -> [f64; 2] {
 struct OverlapMeter<'a> {
     survey: &'a Survey,
     poses: &'a [Pose],
-    pixels: Vec<[f64; 2]>,
+    /// The pixels of each camera that may show the wall.
+    pixels: Vec<Vec<[f64; 2]>>,
 }
 
 impl<'a> OverlapMeter<'a> {
     fn new(survey: &'a Survey, poses: &'a [Pose]) -> Self {
-        let camera = &survey.camera;
         let [columns, rows] = GRID_PIXELS;
+        let [width, height] = survey.cameras.size();
         let middle =
             |k: usize, of: usize, px: u32| (k as f64 + 0.5) / of as f64 * f64::from(px) - 0.5;
         let pixel = |k: usize| {
-            let u = middle(k % columns, columns, camera.width);
-            [u, middle(k / columns, rows, camera.height)]
+            let u = middle(k % columns, columns, width);
+            [u, middle(k / columns, rows, height)]
         };
-        let pixels = (0..columns * rows).map(pixel);
+        let of_camera = |camera: usize| {
+            let pixels = (0..columns * rows).map(pixel);
+            pixels
+                .filter(|pixel| shows_wall(survey, camera, &Vector2::from(*pixel)))
+                .collect()
+        };
         Self {
             survey,
             poses,
-            pixels: pixels
-                .filter(|pixel| shows_wall(survey, &Vector2::from(*pixel)))
-                .collect(),
+            pixels: (0..survey.cameras.count()).map(of_camera).collect(),
         }
     }
 
     /// Wall points of a frame's pixels that are not ignored, world coordinates, metres.
     fn wall_points(&self, frame: usize) -> Vec<Vector3<f64>> {
         let (survey, pose) = (self.survey, &self.poses[frame]);
-        let hits = self.pixels.iter().filter_map(|[u, v]| {
-            let ray = pose.r_wc * survey.camera.ray(*u, *v)?;
+        let camera = survey.cameras.of(frame);
+        let pixels = self.pixels[frame % self.pixels.len()].iter();
+        let hits = pixels.filter_map(|[u, v]| {
+            let ray = pose.r_wc * camera.ray(*u, *v)?;
             let hit = survey.surface.hit(&pose.t_wc, &ray).ok()?;
             (!survey.ignored.contains(&hit.wall)).then_some(hit.x_w)
         });
@@ -89,17 +96,17 @@ impl<'a> OverlapMeter<'a> {
     fn shared_share(&self, points: &[Vector3<f64>], other: usize) -> f64 {
         let is_shown = |x_w: &&Vector3<f64>| {
             let x_c = self.poses[other].to_camera(x_w);
-            let pixel = self.survey.camera.project(&x_c);
-            pixel.is_some_and(|pixel| shows_wall(self.survey, &pixel))
+            let pixel = self.survey.cameras.of(other).project(&x_c);
+            pixel.is_some_and(|pixel| shows_wall(self.survey, other, &pixel))
         };
         points.iter().filter(is_shown).count() as f64 / (GRID_PIXELS[0] * GRID_PIXELS[1]) as f64
     }
 }
 
-/// True if the lens covers a pixel and the mask does not hide it.
-fn shows_wall(survey: &Survey, pixel: &Vector2<f64>) -> bool {
-    let mask = survey.frames.mask();
-    survey.camera.is_in_image(pixel, 0.0)
+/// True if the lens covers a pixel of a frame and the mask does not hide it.
+fn shows_wall(survey: &Survey, frame: usize, pixel: &Vector2<f64>) -> bool {
+    let mask = survey.frames.masks().of(frame);
+    (survey.cameras.of(frame)).is_in_image(pixel, 0.0)
         && mask.is_none_or(|mask| mask.is_clear(pixel.x as f32, pixel.y as f32, 0.0))
 }
 
@@ -111,7 +118,8 @@ impl OverlapCheck {
         let perimeter_m = surface.perimeter_m();
         let footprints: Vec<Option<Footprint>> = poses
             .iter()
-            .map(|pose| Footprint::trace(surface, &survey.camera, pose).ok())
+            .enumerate()
+            .map(|(k, pose)| Footprint::trace(surface, survey.cameras.of(k), pose).ok())
             .collect();
         let meter = OverlapMeter::new(survey, poses);
         let sides = |a: usize, b: usize| {
@@ -119,20 +127,21 @@ impl OverlapCheck {
             Some(shared_sides(a, b, perimeter_m))
         };
         let meet = |a: usize, b: usize| sides(a, b).is_some_and(|[s, h]| s > 0.0 && h > 0.0);
-        let shares: Vec<f64> =
-            (1..poses.len()).par_map(|k| meter.shared_share(&meter.wall_points(k - 1), k));
+        let cameras = survey.cameras.count();
+        let shares: Vec<f64> = (cameras..poses.len())
+            .par_map(|k| meter.shared_share(&meter.wall_points(k - cameras), k));
         let least = shares.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
         let step = poses.len().div_ceil(MAX_MEASURED_FRAMES).max(1);
         let others = |k: usize| {
-            let others =
-                (0..poses.len()).filter(|other| other.abs_diff(k) > MAX_NEIGHBOUR_DISTANCE);
+            let others = (0..poses.len())
+                .filter(|other| other.abs_diff(k) > MAX_NEIGHBOUR_DISTANCE * cameras);
             let points = meter.wall_points(k);
             let shares = others
                 .filter(|other| meet(k, *other))
                 .map(|other| meter.shared_share(&points, other));
             shares.fold(0.0, f64::max)
         };
-        let widths = (1..poses.len()).filter_map(|k| sides(k - 1, k));
+        let widths = (cameras..poses.len()).filter_map(|k| sides(k - cameras, k));
         Self {
             neighbours: median_or_zero(shares.iter().copied()),
             least_neighbours: least.map_or(0.0, |(_, share)| *share),

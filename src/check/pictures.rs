@@ -52,7 +52,7 @@ impl PictureCheck {
 
     /// Decodes a dozen frames and examines start and end of all; also returns the faults.
     pub(super) fn of(survey: &Survey) -> (Self, Vec<String>) {
-        let (width, height) = (survey.camera.width, survey.camera.height);
+        let [width, height] = survey.cameras.size();
         let examined = (survey.frames).par_map(|file| {
             file.examine(width, height)
                 .err()
@@ -72,7 +72,7 @@ impl PictureCheck {
             sampled.par_map(|file| match StoredFrame::decode(file, width, height) {
                 Ok(frame) => {
                     let mut grey = frame.grey();
-                    if let Some(mask) = survey.frames.mask() {
+                    if let Some(mask) = survey.frames.masks().of(file.index) {
                         mask.blank(&mut grey);
                     }
                     let used_bits = used_bits(&frame).filter(|_| has_sixteen_bits(file));
@@ -80,10 +80,7 @@ impl PictureCheck {
                 }
                 Err(error) => Err(error.to_string()),
             });
-        let hidden = survey
-            .frames
-            .mask()
-            .map_or(0.0, |mask| mask.masked_fraction());
+        let hidden = survey.frames.masks().masked_fraction();
         let mut pictures = Vec::new();
         for picture in decoded {
             match picture {

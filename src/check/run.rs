@@ -10,6 +10,7 @@ use super::pictures::PictureCheck;
 use super::poses::PosesCheck;
 use super::result::Check;
 use super::warnings::warnings;
+use crate::camera::Camera;
 use crate::refine::{is_motionless, search_readings};
 use crate::render::native_px_per_metre;
 use crate::surface::SurfaceError;
@@ -23,7 +24,7 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     let poses = survey.initial_poses();
     let surface = survey.surface.as_ref();
     // Opening a survey checks its poses, so a failure means a camera that shows no wall.
-    let px_per_metre = native_px_per_metre(surface, &survey.camera, &poses)
+    let px_per_metre = native_px_per_metre(surface, &survey.cameras, &poses)
         .map_err(|_| SurfaceError::LooksAlongTheAxis)?;
     let overlap = OverlapCheck::of(survey, &poses);
     let (pictures, mut faults) = PictureCheck::of(survey);
@@ -37,7 +38,12 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
             Overlay::default()
         }
     };
-    let own = survey.frames.mask().map(|mask| mask.as_ref().clone());
+    let own = survey
+        .frames
+        .masks()
+        .of(0)
+        .filter(|_| !survey.cameras.is_rig());
+    let own = own.map(|mask| mask.as_ref().clone());
     let proposed_mask = match (own, overlay.mask) {
         (Some(own), Some(found)) => Some(own.union(&found)),
         (own, found) => own.or(found),
@@ -54,8 +60,8 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     }
     let mut check = Check {
         frames: survey.frames.len(),
-        size_px: [survey.camera.width, survey.camera.height],
-        shown_share: survey.camera.visible_fraction(),
+        size_px: survey.cameras.size(),
+        shown_share: mean_visible_fraction(survey),
         masks: MaskCheck::of(survey),
         overlay: overlay.report,
         proposed_mask,
@@ -86,6 +92,12 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     }
     check.warnings.extend(warnings(&check));
     Ok(check)
+}
+
+/// Share of the picture that the lens covers, 0 to 1: the mean over the cameras.
+fn mean_visible_fraction(survey: &Survey) -> f64 {
+    let cameras = survey.cameras.all().iter();
+    cameras.map(Camera::visible_fraction).sum::<f64>() / survey.cameras.count() as f64
 }
 
 #[cfg(test)]

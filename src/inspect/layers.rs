@@ -58,8 +58,8 @@ pub(super) fn lay_out_texture<'a>(
             memory: options.memory,
             ..StitchOptions::default()
         };
-        let (camera, frames) = (&survey.camera, &survey.frames);
-        Stitch::new(surface, camera, frames, poses, shutter, &options)
+        let (cameras, frames) = (&survey.cameras, &survey.frames);
+        Stitch::new(surface, cameras, frames, poses, shutter, &options)
     };
     let px_per_metre = lay_out(options.px_per_metre)?.canvas().px_per_metre;
     lay_out(Some(tiles_px_per_metre(surface, px_per_metre)))
@@ -122,7 +122,7 @@ pub fn draw_layers(
     let surface = survey.surface.as_ref();
     let frames = survey.frames.iter().map(|frame| frame.name()).collect();
     let name = survey_name(survey);
-    let manifest = Manifest::new(name, surface, &survey.camera, frames, twelve_at_deg, drawn);
+    let manifest = Manifest::new(name, surface, &survey.cameras, frames, twelve_at_deg, drawn);
     let wall = WallPoints::new(surface, manifest.chainage_m);
     write_json(folder, MANIFEST, &manifest)?;
     write_json(folder, WALL, &wall)
@@ -185,7 +185,7 @@ pub fn pose_source_frames(
     let surface = survey.surface.as_ref();
     let mut placements = Vec::new();
     for layer in layers {
-        let placed = place_frames(surface, &survey.camera, &layer.poses, &layer.shutter)?;
+        let placed = place_frames(surface, &survey.cameras, &layer.poses, &layer.shutter)?;
         placements.push((layer.name.to_owned(), placed));
     }
     // The deformation is painted over the first.
@@ -194,7 +194,7 @@ pub fn pose_source_frames(
     }
     Ok(SourceFrames {
         surface: survey.surface,
-        camera: survey.camera,
+        cameras: survey.cameras,
         frames: survey.frames,
         placements,
     })

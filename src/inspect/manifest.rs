@@ -1,6 +1,6 @@
 //! Metadata of the viewer's page besides the tiles: `tunnel.json` and `wall.json`.
 
-use crate::camera::Camera;
+use crate::camera::Cameras;
 use crate::inspect::layer_values::LayerValues;
 use crate::inspect::level_strip::BORDER;
 use crate::inspect::mesh::{GridLines, WallRectangle};
@@ -44,7 +44,8 @@ pub struct Manifest {
     pub chainage_m: [f64; 2],
     /// Names of the frames.
     pub frames: Vec<String>,
-    /// Unit directions of the corners of a frame in camera coordinates, in order around it.
+    /// Unit directions of the corners of a frame (of a rig, of one of its first camera) in camera
+    /// coordinates, in order around it.
     pub corners: Vec<[f64; 3]>,
     /// Layers, with the initially shown one first.
     pub layers: Vec<PanoramaLayer>,
@@ -131,15 +132,13 @@ impl Manifest {
     pub fn new(
         name: String,
         surface: &dyn Surface,
-        camera: &Camera,
+        cameras: &Cameras,
         frames: Vec<String>,
         twelve_at_deg: f64,
         layers: Vec<PanoramaLayer>,
     ) -> Self {
-        let (right, below) = (
-            f64::from(camera.width) - 1.0,
-            f64::from(camera.height) - 1.0,
-        );
+        let camera = cameras.of(0);
+        let [right, below] = cameras.size().map(|side| f64::from(side) - 1.0);
         let corners = [[0.0, 0.0], [right, 0.0], [right, below], [0.0, below]];
         let direction = |[u, v]: [f64; 2]| Some(camera.ray(u, v)?.normalize().into());
         let start = [f64::INFINITY, f64::NEG_INFINITY];

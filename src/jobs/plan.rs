@@ -151,9 +151,9 @@ impl Work {
         let length_m = chainages().fold(f64::NEG_INFINITY, f64::max)
             - chainages().fold(f64::INFINITY, f64::min);
         // A camera that shows no wall makes no panorama: refining says so.
-        let px_per_metre = native_px_per_metre(surface, &survey.camera, &survey.initial_poses());
+        let px_per_metre = native_px_per_metre(surface, &survey.cameras, &survey.initial_poses());
         let px_per_metre = px_per_metre.unwrap_or_default();
-        let height = length_m * px_per_metre + f64::from(survey.camera.height);
+        let height = length_m * px_per_metre + f64::from(survey.cameras.size()[1]);
         Self {
             refine_s: refine_processor_s(survey, &RefineOptions::default()),
             refine_bytes: refine_bytes(survey),

@@ -101,12 +101,23 @@ fn survey_facts(survey: &Survey, refined_poses: &Path) -> SurveyFacts {
         folder: printed(&survey.folder).to_string(),
         refined_poses: printed(refined_poses).to_string(),
         frames: survey.frames.len(),
-        frame_size_px: [survey.camera.width, survey.camera.height],
+        frame_size_px: survey.cameras.size(),
         perimeter_m: survey.surface.perimeter_m(),
         truth: survey.truth.is_some(),
         file: object(&survey.file),
-        camera: object(&survey.camera),
+        camera: camera_facts(survey),
     }
+}
+
+/// The camera, or those of a rig by their numbers.
+fn camera_facts(survey: &Survey) -> Map<String, Value> {
+    if !survey.cameras.is_rig() {
+        return object(survey.cameras.of(0));
+    }
+    let cameras = survey.cameras.all().iter().enumerate();
+    cameras
+        .map(|(k, camera)| (k.to_string(), Value::Object(object(camera))))
+        .collect()
 }
 
 /// A struct as a JSON object.
@@ -255,7 +266,7 @@ fn notes(survey: &Survey, refined: &RefinedFiles, comparison: &Comparison) -> Ve
             }
             if let Some(calibration) = &refinement.calibration
                 && (calibration.radius_m != survey.file.tunnel.nominal_m()
-                    || calibration.camera != Value::Object(object(&survey.camera)))
+                    || calibration.camera != Value::Object(object(survey.cameras.of(0))))
             {
                 notes.push(
                     "The poses were refined together with the calibration, but this report uses \

@@ -73,7 +73,7 @@ pub struct SurveyFacts {
     pub truth: bool,
     /// Current content of `survey.toml`.
     pub file: serde_json::Map<String, serde_json::Value>,
-    /// The camera.
+    /// The camera; those of a rig by their numbers.
     pub camera: serde_json::Map<String, serde_json::Value>,
 }
 

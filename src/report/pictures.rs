@@ -122,7 +122,7 @@ pub fn thumbnails(
     flagged: &[usize],
     pictures: &mut Pictures,
 ) -> Result<Vec<Thumbnail>, ReportError> {
-    let (width, height) = (survey.camera.width, survey.camera.height);
+    let [width, height] = survey.cameras.size();
     let scale = (f64::from(THUMBNAIL_WIDTH_PX) / f64::from(width)).min(1.0);
     let shown = flagged.iter().take(MAX_THUMBNAILS);
     shown

@@ -18,17 +18,17 @@ const RESOLUTION_STEP: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// # Errors
 /// [`ReportError::Render`]: poses that lie nowhere on the wall, frames that cannot be read.
 pub fn choose_resolution(survey: &Survey, poses: &[Pose]) -> Result<Option<f64>, ReportError> {
-    let (surface, camera) = (survey.surface.as_ref(), &survey.camera);
-    let placements = place_frames(surface, camera, poses, &survey.shutter())?;
-    let native = native_px_per_metre(surface, camera, poses)?;
+    let (surface, cameras) = (survey.surface.as_ref(), &survey.cameras);
+    let placements = place_frames(surface, cameras, poses, &survey.shutter())?;
+    let native = native_px_per_metre(surface, cameras, poses)?;
     let mut px_per_metre = native;
     loop {
         // A canvas that is far too fine is an error, so it counts as too large.
         let pixels = Canvas::of_placements(surface, &placements, px_per_metre)
             .map_or(usize::MAX, |canvas| canvas.pixels());
-        let level = level_for(camera, native, px_per_metre);
+        let level = level_for(cameras.shorter_side(), native, px_per_metre);
         let one = survey.frames.first(1);
-        let bytes = PictureCache::open(&one, camera, level)?.frame_bytes() * poses.len() as u64;
+        let bytes = PictureCache::open(&one, cameras, level)?.frame_bytes() * poses.len() as u64;
         // Frames are halved at most six times.
         let fits = bytes <= MAX_FRAME_BYTES || px_per_metre < native / 64.0;
         if (pixels <= MAX_PIXELS && fits) || px_per_metre < 1e-6 * native {

@@ -81,8 +81,9 @@ fn what_is_left_out_is_what_the_fittings_hide() {
             .apply(&Pose::new(UnitQuaternion::identity(), x_w))
             .t_wc;
         (0..FRAMES).any(|frame| {
-            let pixel = survey.camera.project(&scene.truth()[frame].to_camera(&x_w));
-            pixel.is_some_and(|pixel| survey.camera.is_in_image(&pixel, 0.0))
+            let camera = survey.cameras.of(frame);
+            let pixel = camera.project(&scene.truth()[frame].to_camera(&x_w));
+            pixel.is_some_and(|pixel| camera.is_in_image(&pixel, 0.0))
                 && scene.is_hidden(frame, &x_w)
         })
     };

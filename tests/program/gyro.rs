@@ -167,7 +167,7 @@ fn a_gyros_log_makes_poses_that_refine() {
     let refined = poses_of(&tum::read(&out.join("poses.tum")).unwrap());
     let survey = Survey::open(&survey).unwrap();
     let px = |poses: &[Pose]| {
-        let error = wall_error(survey.surface.as_ref(), &survey.camera, poses, &truth);
+        let error = wall_error(survey.surface.as_ref(), &survey.cameras, poses, &truth);
         error.unwrap().px.rms
     };
     let (before, after) = (px(&poses), px(&refined));

@@ -40,6 +40,7 @@ mod recordings;
 mod refine;
 mod report;
 mod resume;
+mod rig;
 mod rolling;
 mod shapes;
 mod shifted_poses;

@@ -50,7 +50,7 @@ fn refined(survey: &Path) -> (Value, f64) {
     let survey = Survey::open(survey).unwrap();
     let poses: Vec<Pose> = poses_of(&survey.read_poses(&out.join("poses.tum")).unwrap());
     let truth = poses_of(survey.truth.as_deref().unwrap());
-    let error = wall_error(survey.surface.as_ref(), &survey.camera, &poses, &truth).unwrap();
+    let error = wall_error(survey.surface.as_ref(), &survey.cameras, &poses, &truth).unwrap();
     (serde_json::from_str(&json).unwrap(), error.px.rms)
 }
 
@@ -72,7 +72,8 @@ fn behind_its_mask_a_shaft_costs_no_more_than_the_wall_it_hides() {
     let share = Survey::open(&masked)
         .unwrap()
         .frames
-        .mask()
+        .masks()
+        .of(0)
         .unwrap()
         .masked_fraction();
     assert!((share - 0.09).abs() < 0.005, "{share}");
@@ -265,7 +266,7 @@ fn a_mask_is_recognised_reported_recorded_and_kept() {
     let run = std::fs::read_to_string(out.join("run.toml")).unwrap();
     assert!(run.contains("mask.png"), "{run}");
     let calibrated = Survey::open(&out).unwrap();
-    assert!(calibrated.frames.mask().is_some());
+    assert!(calibrated.frames.masks().of(0).is_some());
     assert_eq!(calibrated.ignored, Survey::open(&survey).unwrap().ignored);
 }
 
@@ -283,7 +284,12 @@ fn paint_water<P: Fn([u32; 2], WallPoint) -> Option<u8>>(
         let water = water(k);
         let mut picture = image::open(&frame.path).unwrap().to_luma8();
         for (u, v, pixel) in picture.enumerate_pixels_mut() {
-            let ray = pose.r_wc * survey.camera.ray(f64::from(u), f64::from(v)).unwrap();
+            let ray = pose.r_wc
+                * survey
+                    .cameras
+                    .of(0)
+                    .ray(f64::from(u), f64::from(v))
+                    .unwrap();
             let wall = survey.surface.hit(&pose.t_wc, &ray).unwrap().wall;
             if WATER_DEG.contains(&(wall.s_m / 3.0).to_degrees()) {
                 pixel.0[0] = water([u, v], wall).unwrap_or(pixel.0[0]);
@@ -360,6 +366,6 @@ fn water_that_mirrors_is_left_out_as_a_band() {
     assert!(sure.len() >= 30, "{}", sure.len());
     let of = |poses: &[Pose]| -> Vec<Pose> { sure.iter().map(|k| poses[*k]).collect() };
     let (poses, truth) = (of(&poses), of(&truth));
-    let error = wall_error(survey.surface.as_ref(), &survey.camera, &poses, &truth).unwrap();
+    let error = wall_error(survey.surface.as_ref(), &survey.cameras, &poses, &truth).unwrap();
     assert!(error.px.rms < 0.2, "{:?}", error.px);
 }

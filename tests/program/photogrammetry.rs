@@ -276,7 +276,8 @@ fn init_takes_the_size_of_a_bundle_files_camera_from_the_frames() {
     ] {
         assert!(toml.contains(line), "{toml}");
     }
-    let camera = Survey::open(dir).unwrap().camera;
+    let survey = Survey::open(dir).unwrap();
+    let camera = survey.cameras.of(0);
     assert_eq!((camera.width, camera.height), (480, 360));
     assert_eq!((camera.fx, camera.cx, camera.cy), (400.0, 239.5, 179.5));
 }

@@ -8,6 +8,7 @@ use image::{DynamicImage, GrayImage};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use tunnelstitch::camera::Camera;
 use tunnelstitch::survey::Survey;
 use tunnelstitch::trajectory::Pose;
 
@@ -171,7 +172,10 @@ fn init_says_which_topics_cannot_be_read() {
     let dir = tempfile::tempdir().unwrap();
     let pictures = simulated(dir.path());
     let mut survey = Survey::open(&pictures).unwrap();
-    survey.camera.fx = 1e-3;
+    survey.cameras = survey.cameras.map(|camera| Camera {
+        fx: 1e-3,
+        ..*camera
+    });
     let messages = messages_of(&survey, Wire::Ros1);
     let folder = recorded(&pictures, "robot.bag", |path| write_bag(path, &messages));
     std::fs::remove_file(folder.join("groundtruth.tum")).unwrap();

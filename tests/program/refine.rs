@@ -138,7 +138,7 @@ fn photometric_wall_px(survey: &Path, out: &Path) -> f64 {
     let refined = tunnelstitch::trajectory::tum::read(&out.join("poses.tum")).unwrap();
     let error = tunnelstitch::evaluate::wall_error(
         survey.surface.as_ref(),
-        &survey.camera,
+        &survey.cameras,
         &poses(&refined),
         &poses(survey.truth.as_ref().unwrap()),
     );

@@ -60,7 +60,7 @@ fn every_experiment_is_a_complete_survey() {
         );
         let survey = Survey::open(&out).unwrap();
         assert_eq!(survey.frames.len(), 4);
-        assert_eq!((survey.camera.width, survey.camera.height), (64, 48));
+        assert_eq!(survey.cameras.size(), [64, 48]);
         let truth = survey.truth.unwrap();
         let same = survey.initial == truth;
         assert_eq!(same, experiment == "centred", "{experiment}");

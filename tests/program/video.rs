@@ -144,7 +144,7 @@ fn refined(survey: &Path) -> (String, f64) {
     let survey = Survey::open(survey).unwrap();
     let found = poses_of(&survey.read_poses(&poses).unwrap());
     let truth = poses_of(survey.truth.as_deref().unwrap());
-    let error = wall_error(survey.surface.as_ref(), &survey.camera, &found, &truth).unwrap();
+    let error = wall_error(survey.surface.as_ref(), &survey.cameras, &found, &truth).unwrap();
     (std::fs::read_to_string(poses).unwrap(), error.px.rms)
 }
 

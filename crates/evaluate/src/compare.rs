@@ -10,7 +10,7 @@ use crate::wall_error::{WallError, wall_error};
 use serde::{Deserialize, Serialize};
 use tunnelstitch_core::frames::FrameSet;
 use tunnelstitch_core::progress::{JobStage, Progress};
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 use tunnelstitch_render::{
@@ -27,7 +27,7 @@ pub struct CompareInput<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
     /// The camera.
-    pub camera: &'a Camera,
+    pub cameras: &'a Cameras,
     /// The frames on disk.
     pub files: &'a FrameSet,
     /// Poses before refinement, one per frame.
@@ -142,7 +142,7 @@ pub fn compare(
                 poses,
             )?);
             scores.unaligned = Some(unaligned_error(candidate.given, poses)?);
-            let wall = wall_error(input.surface, input.camera, candidate.given, poses)?;
+            let wall = wall_error(input.surface, input.cameras, candidate.given, poses)?;
             scores.wall = Some(wall);
             scores.image = Some(image_metrics(&compared.panorama, &truth.panorama)?);
         }
@@ -234,7 +234,7 @@ impl<'a> PlacedPoses<'a> {
             }
             None => given.to_vec(),
         };
-        let placements = place_frames(input.surface, input.camera, &aligned, input.shutter)
+        let placements = place_frames(input.surface, input.cameras, &aligned, input.shutter)
             .map_err(|source| EvaluateError::Render { which, source })?;
         Ok(Self {
             which,
@@ -316,7 +316,7 @@ impl<'a> Candidates<'a> {
     fn lay_out(&self, input: &CompareInput) -> Result<LaidOut, EvaluateError> {
         let fail = |source| self.fail(source);
         let native =
-            native_px_per_metre(input.surface, input.camera, self.best().given).map_err(fail)?;
+            native_px_per_metre(input.surface, input.cameras, self.best().given).map_err(fail)?;
         let placements = [
             Some(&self.baseline),
             Some(&self.refined),
@@ -331,8 +331,8 @@ impl<'a> Candidates<'a> {
             input.px_per_metre.unwrap_or(native),
         )
         .map_err(fail)?;
-        let level = level_for(input.camera, native, canvas.px_per_metre);
-        let frames = PictureCache::open(input.files, input.camera, level).map_err(fail)?;
+        let level = level_for(input.cameras.shorter_side(), native, canvas.px_per_metre);
+        let frames = PictureCache::open(input.files, input.cameras, level).map_err(fail)?;
         let memory_bytes = check_memory(&canvas, PANORAMAS, &frames).map_err(fail)?;
         Ok(LaidOut {
             frames,

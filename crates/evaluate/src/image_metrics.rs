@@ -69,7 +69,7 @@ mod tests {
 
     fn panorama(wall: &TestWall, mut stack: PictureCache, ppm: f64) -> Panorama {
         let placements =
-            place_frames(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
+            place_frames(&wall.circle, wall.camera, &wall.poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, ppm).unwrap();
         render(
             &wall.circle,

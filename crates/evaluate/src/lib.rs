@@ -25,7 +25,7 @@
 //! let survey = Survey::open(Path::new("../../fixtures/blender_free48"))?;
 //! let truth = poses_of(survey.truth.as_deref().ok_or("no true poses")?);
 //! let initial = survey.initial_poses();
-//! let error = wall_error(survey.surface.as_ref(), &survey.camera, &initial, &truth)?;
+//! let error = wall_error(survey.surface.as_ref(), &survey.cameras, &initial, &truth)?;
 //! assert!(error.px.rms > 1.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

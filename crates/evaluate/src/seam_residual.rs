@@ -159,7 +159,6 @@ fn sample_frames(
     grid: &Canvas,
     tile: &Tile,
 ) -> Vec<RunningVariance> {
-    let camera = frames.camera();
     let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
     let points = tile.points(surface, grid);
     let mut seen = vec![RunningVariance::default(); points.len()];
@@ -168,7 +167,7 @@ fn sample_frames(
             continue;
         };
         let pose = &placements[*frame].pose;
-        let camera = placements[*frame].camera(camera);
+        let camera = placements[*frame].camera(frames.cameras().of(*frame));
         for (x_w, seen) in points.iter().zip(&mut seen) {
             let pixel = camera
                 .project(&pose.to_camera(x_w))
@@ -253,7 +252,7 @@ mod tests {
         let stack = pictures(&wall);
         let residual = |poses: &[tunnelstitch_geometry::trajectory::Pose]| {
             let placements =
-                place_frames(&wall.circle, &wall.camera, poses, &Shutter::default()).unwrap();
+                place_frames(&wall.circle, wall.camera, poses, &Shutter::default()).unwrap();
             let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
             seam_residual(&wall.circle, &stack, &placements, &canvas).unwrap()
         };
@@ -272,7 +271,7 @@ mod tests {
         let flat = |value| Picture::new(w, h, 1, vec![value; w * h]);
         let poses = vec![wall.poses[0]; 3];
         let placements =
-            place_frames(&wall.circle, &wall.camera, &poses, &Shutter::default()).unwrap();
+            place_frames(&wall.circle, wall.camera, &poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
         let of = |values: &[u8]| {
             let pictures: Vec<Picture> = values.iter().map(|value| flat(*value)).collect();
@@ -294,7 +293,7 @@ mod tests {
         let mut wrong = wall.poses.clone();
         wrong[4].t_wc.y += 0.05;
         let placements =
-            place_frames(&wall.circle, &wall.camera, &wrong, &Shutter::default()).unwrap();
+            place_frames(&wall.circle, wall.camera, &wrong, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
         let map = SeamMap::new(&wall.circle, &pictures(&wall), &placements, &canvas);
         let [around, along] = map.size();

@@ -59,7 +59,7 @@ fn with_input<T>(
     let truth = survey.truth.as_deref().map(poses_of);
     act(&CompareInput {
         surface: survey.surface.as_ref(),
-        camera: &survey.camera,
+        cameras: &survey.cameras,
         shutter: &survey.shutter(),
         files: &survey.frames,
         initial: &initial,

@@ -6,7 +6,7 @@ use crate::error_statistics::{ErrorStatistics, root_mean_square};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::{Camera, Cameras};
 use tunnelstitch_geometry::surface::{
     Surface, SurfaceError, gauge_component, shortest_arc, sighted_wall, viewing_distance,
 };
@@ -51,16 +51,17 @@ pub struct WallError {
 /// wall.
 pub fn wall_error(
     surface: &dyn Surface,
-    camera: &Camera,
+    cameras: impl Into<Cameras>,
     estimated: &[Pose],
     truth: &[Pose],
 ) -> Result<WallError, EvaluateError> {
+    let cameras = cameras.into();
     check_pairs(estimated.len(), truth.len())?;
     let perimeter_m = surface.perimeter_m();
     let (mut delta_s, mut delta_h, mut pixel_m) = (Vec::new(), Vec::new(), Vec::new());
     let mut ends = Vec::new();
     for (frame, (estimate, truth)) in estimated.iter().zip(truth).enumerate() {
-        let offsets = frame_offsets(surface, camera, frame, estimate, truth)?;
+        let offsets = frame_offsets(surface, cameras.of(frame), frame, estimate, truth)?;
         delta_s.extend(offsets.delta_s_m);
         delta_h.extend(offsets.delta_h_m);
         pixel_m.resize(delta_s.len(), offsets.pixel_m);
@@ -200,7 +201,7 @@ mod tests {
         let (circle, camera, truth) = scene();
         for alpha_rad in [0.3, 3.1, -3.1] {
             let gauge = GaugeMotion::about_y(alpha_rad, -7.0);
-            let error = wall_error(&circle, &camera, &gauge.apply_all(&truth), &truth).unwrap();
+            let error = wall_error(&circle, camera, &gauge.apply_all(&truth), &truth).unwrap();
             assert!(error.mm.max < 1e-6, "{}", error.mm.max);
             assert!((error.shift_s_m - 3.0 * alpha_rad).abs() < 1e-9);
             assert!((error.shift_h_m + 7.0).abs() < 1e-9);
@@ -212,7 +213,7 @@ mod tests {
         let (circle, camera, truth) = scene();
         let mut estimated = truth.clone();
         estimated[5].t_wc.y += 0.024;
-        let error = wall_error(&circle, &camera, &estimated, &truth).unwrap();
+        let error = wall_error(&circle, camera, &estimated, &truth).unwrap();
         // The mean shift of 1 mm is removed everywhere.
         assert!((error.frame_rms_mm[5] - 23.0).abs() < 1e-6);
         assert!((error.mm.median - 1.0).abs() < 1e-6);
@@ -229,7 +230,7 @@ mod tests {
         let (circle, camera, truth) = scene();
         let mut estimated = truth.clone();
         estimated[2].t_wc.x = 5.0;
-        let message = wall_error(&circle, &camera, &estimated, &truth)
+        let message = wall_error(&circle, camera, &estimated, &truth)
             .unwrap_err()
             .to_string();
         assert!(message.contains("frame 2, estimated pose"), "{message}");

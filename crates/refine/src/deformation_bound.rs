@@ -97,15 +97,20 @@ pub fn deformation_bound(
     }))
 }
 
-/// Indices of up to [`MAX_FRAMES`] frames that show some wall, from the middle of the survey.
+/// Indices of up to [`MAX_FRAMES`] frames that show some wall, from the middle of the survey; of a
+/// rig, of moments all of whose frames do.
 fn middle_frames(survey: &Survey) -> Vec<usize> {
-    let shows_wall = |k: &usize| {
-        let pose = &survey.initial[*k].pose;
-        Footprint::trace(survey.surface.as_ref(), &survey.camera, pose).is_ok()
+    let shows_wall = |k: usize| {
+        let pose = &survey.initial[k].pose;
+        Footprint::trace(survey.surface.as_ref(), survey.cameras.of(k), pose).is_ok()
     };
     let count = survey.initial.len();
     let first = count.saturating_sub(MAX_FRAMES) / 2;
-    (first..count).filter(shows_wall).take(MAX_FRAMES).collect()
+    let cameras = survey.cameras.count();
+    let moments = (first - first % cameras..count).step_by(cameras);
+    let moments = moments.map(|k| k..k + cameras);
+    let shown = moments.filter(|moment| moment.clone().all(shows_wall));
+    shown.take(MAX_FRAMES / cameras).flatten().collect()
 }
 
 /// Poses that advance half as much along a straight tunnel.
@@ -128,19 +133,19 @@ fn bound_at(
     texture: &PictureTexture,
 ) -> Result<Option<DeformationBound>, RefineError> {
     let files = survey.frames.only(frames);
-    let full = &survey.camera;
+    let full = survey.cameras.of_frames(frames);
     let level = (full.shorter_side() / SHORTER_SIDE).max(1).ilog2();
-    let camera = full.at_level(level as usize);
+    let cameras = full.at_level(level as usize);
     let options = RefineOptions::default();
     let input = RefineInput {
-        camera,
+        cameras,
         frames: &files,
         initial,
         pose_gaps: &[],
         ..RefineInput::from(survey)
     };
     let setup = Setup {
-        frames: FrameCache::blank(&files, &camera),
+        frames: FrameCache::blank(&files, input.cameras.size()),
         ..Setup::new(input, &options)?
     };
     let mut state = begin(&setup);
@@ -161,8 +166,9 @@ fn bound_at(
         shape: true,
         ..Sampling::of(0)
     };
-    let poses = initial.iter().map(|stamped| &stamped.pose);
-    let pixel_size_m = pixel_size_on_wall(survey.surface.as_ref(), full, poses);
+    let poses = initial.iter().enumerate();
+    let poses = poses.map(|(k, stamped)| (k, &stamped.pose));
+    let pixel_size_m = pixel_size_on_wall(survey.surface.as_ref(), &full, poses);
     let problem = PhotometricProblem::new(&context, sampling, window)?
         .with_shared_parameters()
         .with_assumed_texture(AssumedTexture {

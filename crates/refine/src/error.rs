@@ -47,6 +47,12 @@ pub enum RefineError {
         /// The parameter that was to be estimated.
         unknown: &'static str,
     },
+    /// The lens of a rig.
+    #[error(
+        "the cameras of a rig are taken as calibrated; leave focal, centre and distortion out of \
+         --calibrate and [calibrate] unknowns"
+    )]
+    LensOfRig,
     /// Something that measured points tell better than frames.
     #[error(
         "{unknown} is that of the measured points; leave it out of --calibrate and [calibrate] \

@@ -1,24 +1,26 @@
-//! The input of a refinement: frames, camera, tunnel, poses and their noise model.
+//! The input of a refinement: frames, cameras, tunnel, poses and their noise model.
 
 use crate::points::wall_points::WallPoints;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameSet;
 use tunnelstitch_core::survey::{CalibrateSection, DEFAULT_SHAPE_SIGMA_RADII, PoseGap, Survey};
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::surface::{Bend, RadialField, Surface, WallRegions, with_range};
-use tunnelstitch_geometry::trajectory::{Jitter, Shutter, StampedPose};
+use tunnelstitch_geometry::trajectory::{Jitter, Rig, Shutter, StampedPose};
 
 /// No part of the wall.
 static NOTHING: WallRegions = WallRegions::NONE;
 
-/// Frames with initial poses, the camera that took them, and the tunnel that they show.
+/// Frames with initial poses, the cameras that took them, and the tunnel that they show.
 ///
 /// A [`Survey`] converts into it; [`RefineInput::new`] makes one of parts in memory.
 #[derive(Clone, Debug)]
 pub struct RefineInput<'a> {
-    /// The camera, at rest.
-    pub camera: Camera,
+    /// The cameras, at rest.
+    pub cameras: Cameras,
+    /// The relation of the cameras, if there are several.
+    pub rig: Option<Rig>,
     /// The tunnel, in its nominal shape.
     pub surface: Arc<dyn Surface>,
     /// The bend that is known of it, and that `surface` has.
@@ -59,14 +61,17 @@ impl<'a> RefineInput<'a> {
     ///
     /// `frames` and `initial` correspond one to one.
     pub fn new(
-        camera: Camera,
+        cameras: impl Into<Cameras>,
         surface: Arc<dyn Surface>,
         frames: &'a FrameSet,
         initial: &'a [StampedPose],
         prior: Jitter,
     ) -> Self {
         Self {
-            camera: with_range(&camera, surface.as_ref()),
+            cameras: cameras
+                .into()
+                .map(|camera| with_range(camera, surface.as_ref())),
+            rig: None,
             bend: None,
             displacement: None,
             shape_sigma_m: DEFAULT_SHAPE_SIGMA_RADII * surface.perimeter_m() / TAU,
@@ -89,7 +94,8 @@ impl<'a> RefineInput<'a> {
 impl<'a> From<&'a Survey> for RefineInput<'a> {
     fn from(survey: &'a Survey) -> Self {
         Self {
-            camera: survey.camera,
+            cameras: survey.cameras.clone(),
+            rig: survey.rig.clone(),
             surface: Arc::clone(&survey.nominal),
             bend: survey.bend,
             displacement: survey.displacement.as_ref(),

@@ -13,6 +13,9 @@ use tunnelstitch_geometry::trajectory::Trajectory;
 pub struct Refined {
     /// Refined poses with the times of the initial ones.
     pub trajectory: Trajectory,
+    /// The poses of a rig's body, one a moment: the mean of those that its cameras give by their
+    /// mounts; None for a single camera.
+    pub bodies: Option<Trajectory>,
     /// The report: solves, verdict and uncertainty of every frame.
     pub report: RefineReport,
     /// Covariances of the poses.

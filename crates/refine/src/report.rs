@@ -12,6 +12,7 @@ use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::uncertainty::shape_report::ShapeReport;
 use crate::verdict::length_scale::LengthScale;
 use crate::verdict::prior_test::PriorTest;
+use crate::verdict::rig_report::MountReport;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::trajectory::Pose;
@@ -166,6 +167,9 @@ pub struct RefineReport {
     pub model_error: Option<ModelErrorReport>,
     /// The refined poses against the prior.
     pub prior_test: PriorTest,
+    /// Relation of the cameras of a rig against the given one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mounts: Vec<MountReport>,
     /// The verdict: whether the result may be used, and for what.
     pub verdict: SurveyVerdict,
     /// The scale: how sure all lengths are.

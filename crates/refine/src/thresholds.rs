@@ -61,6 +61,14 @@ pub mod tracking {
     /// Chosen by: three turns of 120°: a wrong frame spoils its neighbours within a turn.
     pub const MAX_FAILURES: usize = 12;
 
+    /// 1-σ of the place of a registered frame over that of a step, by which the cameras of a rig
+    /// are placed from each other before all frames are solved together.
+    ///
+    /// Higher: cameras of a rig are searched for farther, in more time.
+    ///
+    /// Chosen by: simulated rigs of two and three cameras.
+    pub const REGISTERED_SHARE: f64 = 0.25;
+
     /// The oldest of so many equal parts of a window is held.
     ///
     /// Higher: fewer frames are held, and the window is tied more loosely to the frames before it.

@@ -37,8 +37,8 @@
 //!     ..StitchOptions::default()
 //! };
 //! let (surface, poses) = (survey.surface.as_ref(), survey.initial_poses());
-//! let (camera, frames, shutter) = (&survey.camera, &survey.frames, survey.shutter());
-//! let panorama = stitch(surface, camera, frames, &poses, &shutter, &options, &Silent)?;
+//! let (cameras, frames, shutter) = (&survey.cameras, &survey.frames, survey.shutter());
+//! let panorama = stitch(surface, cameras, frames, &poses, &shutter, &options, &Silent)?;
 //! assert!(panorama.coverage() > 0.5);
 //! let picture = panorama.into_image(Layout::ThetaRight);
 //! assert_eq!(picture.width(), 377);

@@ -7,10 +7,11 @@ use crate::effects::effect_options::FrameEffects;
 use crate::effects::sensor::BitDepth;
 use crate::error::{SimulateError, check_option};
 use crate::fittings::fitting_options::Fittings;
+use crate::rig::RigOptions;
 use serde::Serialize;
 use std::path::PathBuf;
 use tunnelstitch_core::survey::{PriorSection, TunnelSection};
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::{Camera, Cameras};
 use tunnelstitch_geometry::trajectory::JitterModel;
 
 /// Angle between optical axis and tunnel axis of a camera that looks at the wall beside it.
@@ -53,12 +54,15 @@ pub enum Illumination {
 /// Options of a simulated survey.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SimulateOptions {
-    /// Number of frames.
+    /// Number of frames; of a rig, of its moments, at which each camera takes one.
     pub frames: usize,
     /// The tunnel; plan and jitter are defined along its axis as if it were straight.
     pub tunnel: TunnelSection,
-    /// The camera.
+    /// The camera; of a rig, the first.
     pub camera: Camera,
+    /// The rig, if there are several cameras.
+    #[serde(skip_serializing_if = "is_default")]
+    pub rig: Option<RigOptions>,
     /// Advance along the axis from frame to frame, metres.
     pub advance_m: f64,
     /// Turn about the axis from frame to frame, degrees.
@@ -160,6 +164,7 @@ impl SimulateOptions {
             frames: 12,
             tunnel: TunnelSection::round(3.0),
             camera: Camera::from_vertical_fov(640, 480, 60f64.to_radians()),
+            rig: None,
             advance_m: 0.0,
             turn_deg: 30.0,
             view_deg: SIDE_VIEW_DEG,
@@ -206,6 +211,18 @@ impl SimulateOptions {
             jitter: Some(PriorSection::default()),
             ..Self::centred()
         }
+    }
+
+    /// Number of the frames of all cameras.
+    pub fn pictures(&self) -> usize {
+        self.frames * self.rig.map_or(1, |rig| rig.cameras as usize)
+    }
+
+    /// The cameras.
+    pub(super) fn cameras(&self) -> Cameras {
+        let rig = self.rig.map(|rig| rig.cameras(&self.camera));
+        rig.and_then(Cameras::of_rig)
+            .unwrap_or_else(|| self.camera.into())
     }
 
     /// The pose prior that is written into the survey.
@@ -292,6 +309,17 @@ impl SimulateOptions {
             check_option(
                 positive(width_m),
                 "the width of the texture must be a positive number of metres",
+            )?;
+        }
+        if let Some(rig) = &self.rig {
+            rig.validate()?;
+            let is_still = self.readout_ms == 0.0
+                && !self.interlaced
+                && self.effects.motion_blur_px == 0.0
+                && self.bad_frames == BadFrames::default();
+            check_option(
+                is_still,
+                "a rig has no rolling shutter, interlaced fields, motion blur or bad frames",
             )?;
         }
         self.validate_degradations()

@@ -57,7 +57,7 @@ impl Scene {
 
     /// Groups consecutive existing frames, so that the wall of each group fits into bounded memory.
     pub(super) fn batches(&self) -> Vec<FrameBatch> {
-        self.batches_of(0..self.options.frames)
+        self.batches_of(0..self.options.pictures())
     }
 
     /// Groups those of some frames that exist.
@@ -134,7 +134,7 @@ impl Scene {
         times: u32,
         points: u32,
     ) -> GreyImage {
-        let camera = self.camera.upsampled(times);
+        let camera = self.cameras().of(frame).upsampled(times);
         let scenery = Scenery {
             tunnel: &self.tunnel,
             wall: rasters.view(&self.stretches(frame)),

@@ -26,14 +26,16 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::{Camera, Cameras};
 use tunnelstitch_geometry::trajectory::{Jitter, Pose};
 
-/// A tunnel and the camera's path through it.
+/// A tunnel and the path of the camera, or of a rig, through it.
 pub struct Scene {
     pub(super) options: SimulateOptions,
-    pub(super) camera: Camera,
+    cameras: Cameras,
     plan: Vec<Pose>,
+    /// The planned and the true poses of a rig's body.
+    bodies: Option<[Vec<Pose>; 2]>,
     pub(super) motion: FrameMotion,
     /// Minimum and maximum chainage that each frame sees, metres.
     pub(super) visible_h_m: Vec<[f64; 2]>,
@@ -62,7 +64,7 @@ impl Scene {
     /// tunnel or, where the camera is to look at the wall beside it, with a view along it.
     pub fn new(options: &SimulateOptions) -> Result<Self, SimulateError> {
         options.validate()?;
-        let camera = options.camera;
+        let cameras = options.cameras();
         let plan = plan(options);
         let offset = Vector3::from(options.offset_m);
         let mut truth: Vec<Pose> = plan
@@ -77,15 +79,25 @@ impl Scene {
         let tunnel = Tunnel::new(options)?;
         let [plan, truth] = [plan, truth]
             .map(|poses| -> Vec<Pose> { poses.iter().map(|pose| tunnel.to_world(pose)).collect() });
-        let texel_m = texel_size_m(&tunnel, &camera, &truth);
+        let mut bodies = None;
+        let [plan, truth] = match options.rig {
+            Some(rig) => {
+                let mounts = rig.mounts();
+                let placed = [&plan, &truth].map(|poses| of_cameras(poses, &mounts));
+                bodies = Some([plan, truth]);
+                placed
+            }
+            None => [plan, truth],
+        };
+        let texel_m = texel_size_m(&tunnel, cameras.of(0), &truth);
         let motion = FrameMotion::new(options, truth, &tunnel);
         let fog = (options.view_deg != SIDE_VIEW_DEG).then(|| Fog::new(&tunnel));
-        let visible_h_m = (0..options.frames)
-            .map(|frame| visible_chainage(frame, &motion, &camera, &tunnel, fog))
+        let visible_h_m = (0..options.pictures())
+            .map(|frame| visible_chainage(frame, &motion, cameras.of(frame), &tunnel, fog))
             .collect::<Result<Vec<_>, _>>()?;
         let perimeter_m = tunnel.perimeter_m();
         let lamp = match &options.camera_lamp {
-            Some(lamp) => Some(LampLight::new(lamp, &plan[0], &camera, &tunnel)?),
+            Some(lamp) => Some(LampLight::new(lamp, &plan[0], cameras.of(0), &tunnel)?),
             None => None,
         };
         let texture = open_texture(
@@ -110,8 +122,9 @@ impl Scene {
             lamp,
             fog,
             options: options.clone(),
-            camera,
+            cameras,
             plan,
+            bodies,
             motion,
             visible_h_m,
         };
@@ -125,7 +138,7 @@ impl Scene {
 
     /// Refuses a view of more wall than memory is for.
     fn check_texels(&self) -> Result<(), SimulateError> {
-        let most = (0..self.options.frames)
+        let most = (0..self.options.pictures())
             .map(|frame| self.texel_count(&self.stretches(frame)))
             .max();
         if most.unwrap_or(0) <= 4 * MAX_TEXELS {
@@ -144,12 +157,25 @@ impl Scene {
         })
     }
 
-    /// The camera.
+    /// The camera; of a rig, the first.
     pub fn camera(&self) -> &Camera {
-        &self.camera
+        self.cameras.of(0)
     }
 
-    /// The planned poses, which become the survey's initial poses.
+    /// The cameras.
+    pub fn cameras(&self) -> &Cameras {
+        &self.cameras
+    }
+
+    /// The planned and the true poses that the survey's files hold: of a rig, those of its body.
+    pub(super) fn given_poses(&self) -> [&[Pose]; 2] {
+        match &self.bodies {
+            Some([plan, truth]) => [plan, truth],
+            None => [self.plan(), self.truth()],
+        }
+    }
+
+    /// The planned poses of the frames, which become the survey's initial poses.
     pub fn plan(&self) -> &[Pose] {
         &self.plan
     }
@@ -181,7 +207,7 @@ impl Scene {
     /// The indices of all frames that exist, in order.
     pub fn frames(&self) -> impl Iterator<Item = usize> + '_ {
         let bad_frames = &self.options.bad_frames;
-        (0..self.options.frames).filter(|frame| bad_frames.source_frame(*frame).is_some())
+        (0..self.options.pictures()).filter(|frame| bad_frames.source_frame(*frame).is_some())
     }
 
     /// Minimum and maximum chainage of the wall that any frame sees, metres.
@@ -226,7 +252,7 @@ impl Scene {
 
     /// The overlay that is burnt into the frames, if there is one.
     pub(super) fn overlay(&self) -> Option<Overlay> {
-        let size = [self.camera.width as usize, self.camera.height as usize];
+        let size = self.cameras.size().map(|side| side as usize);
         let overlay = |parts| Overlay::new(parts, size, self.options.interval_s);
         self.options.effects.overlay.map(overlay)
     }
@@ -234,9 +260,18 @@ impl Scene {
     /// The shaft of the rig, if it is visible.
     pub(super) fn shaft(&self) -> Option<RigShaft> {
         let percent = self.options.shaft_percent;
-        let (width, height) = (self.camera.width as usize, self.camera.height as usize);
+        let [width, height] = self.cameras.size().map(|side| side as usize);
         (percent > 0.0).then(|| RigShaft::new(percent, width, height))
     }
+}
+
+/// The poses of the cameras of a rig in turn, moment by moment.
+fn of_cameras(bodies: &[Pose], mounts: &[Pose]) -> Vec<Pose> {
+    let of_body = |body: &Pose| -> Vec<Pose> {
+        let cameras = mounts.iter();
+        cameras.map(|mount| body.after(mount)).collect()
+    };
+    bodies.iter().flat_map(of_body).collect()
 }
 
 #[cfg(test)]

@@ -3,16 +3,18 @@
 use crate::error::SimulateError;
 use crate::lining::truth_file::format_deviation;
 use crate::options::SimulateOptions;
+use crate::rig::RigOptions;
 use crate::scene::Scene;
 use image::{GrayImage, Luma};
 use rayon::prelude::*;
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tunnelstitch_core::frames::{PictureFormat, write_picture};
 use tunnelstitch_core::persist::atomic::{self, StagedFolder, WriteError};
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_core::survey::{
-    CameraSection, FramesSection, PosesSection, SURVEY_FILE, SurveyFile, TunnelSection,
+    CameraSection, CameraSections, FramesSection, PosesSection, RigSection, SURVEY_FILE,
+    SurveyFile, TunnelSection,
 };
 use tunnelstitch_geometry::camera::format_calibration;
 use tunnelstitch_geometry::trajectory::{Pose, StampedPose, tum};
@@ -31,7 +33,8 @@ pub struct SimulationRecord {
 /// The folder has `survey.toml`, `camera.json`, `frames/000000.png` … (or `.jpg`), `baseline.tum`
 /// (the plan), `groundtruth.tum` and `simulation.json`, `mask.png` if the rig's shaft is visible,
 /// `overlay.png` if the frames have an overlay, and `groundtruth_shape.csv` if the lining deviates
-/// from the tunnel.
+/// from the tunnel. A rig has the calibration and the mount of each camera in `rig/`, the frames in
+/// a folder for each, and the poses are those of its body.
 ///
 /// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier
 /// simulated survey of that name is replaced. The same options give the same bytes, whatever the
@@ -77,7 +80,7 @@ pub fn stage_survey(
     };
     write_text_files(&scene, &simulated, folder.path()).map_err(final_name)?;
     write_masks(&scene, folder.path()).map_err(final_name)?;
-    write_frames(&scene, &folder.path().join("frames"), progress).map_err(final_name)?;
+    write_frames(&scene, folder.path(), progress).map_err(final_name)?;
     Ok((simulated, folder))
 }
 
@@ -114,6 +117,9 @@ const OVERLAY_FILE: &str = "overlay.png";
 /// Centreline of a curved tunnel.
 const CENTRELINE_FILE: &str = "centreline.txt";
 
+/// Folder of the calibrations and mounts of a rig.
+const RIG_FOLDER: &str = "rig";
+
 /// True deviation of a lining as built.
 const TRUE_SHAPE_FILE: &str = "groundtruth_shape.csv";
 
@@ -121,7 +127,7 @@ const TRUE_SHAPE_FILE: &str = "groundtruth_shape.csv";
 const RECORD_FILE: &str = "simulation.json";
 
 /// Files of a simulated survey.
-const FILES: [&str; 11] = [
+const FILES: [&str; 12] = [
     SURVEY_FILE,
     RECORD_FILE,
     // Written by the command line program.
@@ -133,6 +139,7 @@ const FILES: [&str; 11] = [
     "baseline.tum",
     "groundtruth.tum",
     TRUE_SHAPE_FILE,
+    RIG_FOLDER,
     "frames",
 ];
 
@@ -188,12 +195,10 @@ fn write_text_files(
                 .then(|| CENTRELINE_FILE.into()),
             ..options.tunnel.clone()
         },
-        camera: CameraSection {
-            readout_ms: (options.readout_ms != 0.0).then_some(options.readout_ms),
-            ..CameraSection::of_file("camera.json")
-        },
+        camera: camera_sections(options),
+        rig: options.rig.map(|_| RigSection::default()),
         frames: FramesSection {
-            images: Some(format!("frames/*.{}", frame_format(options).1)),
+            images: options.rig.is_none().then(|| pattern_of("frames", options)),
             video: None,
             bag: None,
             topic: None,
@@ -226,7 +231,10 @@ fn write_text_files(
             time_s: frame as f64 * options.interval_s,
             pose: poses[frame],
         };
-        let there: Vec<StampedPose> = scene.frames().map(stamped).collect();
+        let there: Vec<StampedPose> = match options.rig {
+            Some(_) => (0..poses.len()).map(stamped).collect(),
+            None => scene.frames().map(stamped).collect(),
+        };
         tum::format(&there)
     };
     if let Some(centreline) = &options.tunnel.centreline {
@@ -239,9 +247,71 @@ fn write_text_files(
     }
     atomic::write_text(&survey_path, &survey)?;
     atomic::write_text(&record_path, &(record + "\n"))?;
-    atomic::write_text(&path("camera.json"), &format_calibration(scene.camera()))?;
-    atomic::write_text(&path("baseline.tum"), &trajectory(scene.plan()))?;
-    atomic::write_text(&path("groundtruth.tum"), &trajectory(scene.truth()))
+    match options.rig {
+        Some(rig) => write_rig(scene, &rig.mounts(), folder)?,
+        None => atomic::write_text(&path("camera.json"), &format_calibration(scene.camera()))?,
+    }
+    let [plan, truth] = scene.given_poses();
+    atomic::write_text(&path("baseline.tum"), &trajectory(plan))?;
+    atomic::write_text(&path("groundtruth.tum"), &trajectory(truth))
+}
+
+/// The camera, or the cameras of a rig, of `survey.toml`.
+fn camera_sections(options: &SimulateOptions) -> CameraSections {
+    let of_rig = |rig: RigOptions| {
+        let section = |k: u32| CameraSection {
+            frames: Some(pattern_of(&frame_folder(k as usize), options)),
+            body_to_camera: Some(mount_file(k as usize).into()),
+            ..CameraSection::of_file(calibration_file(k as usize))
+        };
+        CameraSections::of_rig((0..rig.cameras).map(section).collect())
+    };
+    options.rig.and_then(of_rig).unwrap_or_else(|| {
+        CameraSection {
+            readout_ms: (options.readout_ms != 0.0).then_some(options.readout_ms),
+            ..CameraSection::of_file("camera.json")
+        }
+        .into()
+    })
+}
+
+/// Writes the calibrations and the mounts of a rig.
+fn write_rig(scene: &Scene, mounts: &[Pose], folder: &Path) -> Result<(), WriteError> {
+    atomic::create_folder(&folder.join(RIG_FOLDER))?;
+    for (k, (camera, mount)) in scene.cameras().all().iter().zip(mounts).enumerate() {
+        let calibration = folder.join(calibration_file(k));
+        atomic::write_text(&calibration, &format_calibration(camera))?;
+        let motion = mount.inverse();
+        let r = motion.r_wc.to_rotation_matrix();
+        let row = |k: usize| {
+            let t = motion.t_wc[k];
+            format!("{} {} {} {t}\n", r[(k, 0)], r[(k, 1)], r[(k, 2)])
+        };
+        let matrix: String = (0..3).map(row).collect();
+        let text = format!("# x_camera = T x_body, metres\n{matrix}0 0 0 1\n");
+        atomic::write_text(&folder.join(mount_file(k)), &text)?;
+    }
+    Ok(())
+}
+
+/// Name of the calibration of a camera of a rig.
+fn calibration_file(camera: usize) -> String {
+    format!("{RIG_FOLDER}/camera{camera}.json")
+}
+
+/// Name of the mount of a camera of a rig.
+fn mount_file(camera: usize) -> String {
+    format!("{RIG_FOLDER}/mount{camera}.txt")
+}
+
+/// Name of the folder with the frames of a camera of a rig.
+fn frame_folder(camera: usize) -> String {
+    format!("frames/camera{camera}")
+}
+
+/// The pattern of the frames in a folder.
+fn pattern_of(folder: &str, options: &SimulateOptions) -> String {
+    format!("{folder}/*.{}", frame_format(options).1)
 }
 
 /// Writes the masks of the rig's shaft and of the overlay, each if it is visible.
@@ -258,7 +328,7 @@ fn write_masks(scene: &Scene, folder: &Path) -> Result<(), WriteError> {
 
 /// Writes a mask: white where the wall is shown, black elsewhere.
 fn write_mask(scene: &Scene, wall: &[bool], path: &Path) -> Result<(), WriteError> {
-    let (width, height) = (scene.camera().width, scene.camera().height);
+    let [width, height] = scene.cameras().size();
     let mask = GrayImage::from_fn(width, height, |u, v| {
         let shown = wall[v as usize * width as usize + u as usize];
         Luma([if shown { 255 } else { 0 }])
@@ -274,11 +344,21 @@ fn frame_format(options: &SimulateOptions) -> (PictureFormat, &'static str) {
     }
 }
 
-/// Renders and writes all frames that exist, named by their numbers in the plan.
+/// Renders and writes all frames that exist into the survey's `folder`, named by their numbers in
+/// the plan.
 ///
 /// The frames of a batch are rendered in parallel from one raster of the wall.
 fn write_frames(scene: &Scene, folder: &Path, progress: &dyn Progress) -> Result<(), WriteError> {
-    atomic::create_folder(folder)?;
+    let frames = folder.join("frames");
+    atomic::create_folder(&frames)?;
+    let cameras = scene.cameras().count();
+    let of_camera: Vec<PathBuf> = match scene.options.rig {
+        Some(_) => (0..cameras).map(|k| folder.join(frame_folder(k))).collect(),
+        None => vec![frames],
+    };
+    for folder in &of_camera {
+        atomic::create_folder(folder)?;
+    }
     let (format, extension) = frame_format(&scene.options);
     progress.start("simulating", scene.frames().count());
     for batch in scene.batches() {
@@ -288,7 +368,8 @@ fn write_frames(scene: &Scene, folder: &Path, progress: &dyn Progress) -> Result
             .into_par_iter()
             .try_for_each(|(frame, source)| {
                 let image = scene.digitised_frame(&rasters, source);
-                let path = folder.join(format!("{frame:06}.{extension}"));
+                let folder = &of_camera[frame % cameras];
+                let path = folder.join(format!("{:06}.{extension}", frame / cameras));
                 write_picture(&path, &image, format)?;
                 progress.advance(1);
                 Ok(())

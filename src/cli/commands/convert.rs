@@ -93,7 +93,14 @@ pub fn run(
         ));
     }
     let camera = || {
-        ColmapCamera::of(&survey.camera).map_err(|error| unknown_model(&error, "tum, kitti or csv"))
+        if survey.cameras.is_rig() {
+            return Err(Failure::usage(
+                "the frames are those of a rig of several cameras; poses alone are written --to \
+                 tum, kitti or csv",
+            ));
+        }
+        ColmapCamera::of(survey.cameras.of(0))
+            .map_err(|error| unknown_model(&error, "tum, kitti or csv"))
     };
     let names = || survey.frame_paths_from(&survey.folder);
     let text = match arguments.to {

@@ -192,7 +192,7 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
         placements, canvas, ..
     } = lay_out(
         surface,
-        &survey.camera,
+        &survey.cameras,
         &poses_of(&trajectory),
         &survey.shutter(),
         arguments.canvas.px_per_metre,
@@ -201,8 +201,8 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
     let layout = Layout::from(arguments.canvas.layout);
     let wall = wall_point(arguments, &survey, &placements, &canvas)?;
     let theta_deg = surface.angle_rad(wall.s_m).to_degrees();
-    let mask = survey.frames.mask().map(AsRef::as_ref);
-    let found = sightings(surface, &survey.camera, mask, &placements, wall);
+    let masks = survey.frames.masks();
+    let found = sightings(surface, &survey.cameras, masks, &placements, wall);
     let panorama_px = layout.to_picture(&canvas, canvas.pixel_of(wall));
     let located = LocatedPoint {
         chainage_m: wall.h_m,
@@ -264,8 +264,8 @@ fn wall_point(
         .map_err(|what| Failure::usage(format!("--frame {frame}: {what}")))?;
     hit_of_pixel(
         survey.surface.as_ref(),
-        &survey.camera,
-        survey.frames.mask().map(AsRef::as_ref),
+        survey.cameras.of(k),
+        survey.frames.masks().of(k).map(AsRef::as_ref),
         &placements[k],
         *pixel,
     )

@@ -33,7 +33,7 @@ pub fn locate_points(
     terminal: &Terminal,
 ) -> Result<(), Failure> {
     let surface = survey.surface.as_ref();
-    let placements = place_frames(surface, &survey.camera, poses, &survey.shutter())?;
+    let placements = place_frames(surface, &survey.cameras, poses, &survey.shutter())?;
     refuse_two_results(out, terminal)?;
     let name = if is_stream(points) {
         "standard input".to_owned()
@@ -55,7 +55,6 @@ pub fn locate_points(
     writer
         .write_record(headers.iter().chain(ADDED_COLUMNS))
         .map_err(written)?;
-    let mask = survey.frames.mask().map(AsRef::as_ref);
     let (mut count, mut found) = (0, 0);
     for record in reader.records() {
         let record = record.map_err(|error| bad(error.to_string()))?;
@@ -63,7 +62,9 @@ pub fn locate_points(
         let at_line = |what: String| bad(format!("line {line}: {what}"));
         let (frame, pixel) = parse(survey, &record, columns).map_err(at_line)?;
         let placement = &placements[frame];
-        let hit = hit_of_pixel(surface, &survey.camera, mask, placement, pixel).ok();
+        let camera = survey.cameras.of(frame);
+        let mask = survey.frames.masks().of(frame).map(AsRef::as_ref);
+        let hit = hit_of_pixel(surface, camera, mask, placement, pixel).ok();
         let added = hit.map_or_else(
             || [(); 3].map(|()| String::new()),
             |hit| {

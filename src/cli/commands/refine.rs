@@ -27,7 +27,8 @@ use std::sync::Arc;
 /// covariance.csv (6 × 6 covariances of every frame and of neighbours) and masked.json (wall where
 /// frames show something else and are left out); shape.json and sections.csv (best-fit circle,
 /// ovality, convergence chords along the tunnel, with 1-σ) if the wall deviates from the given
-/// shape. If the run is interrupted, the same command continues it.
+/// shape. Of a rig, poses.tum has the poses of its cameras, one per picture, and poses_body.tum
+/// those of its body, one a moment. If the run is interrupted, the same command continues it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch refine my-survey --out refined\n  \

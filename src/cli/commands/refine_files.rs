@@ -28,6 +28,8 @@ use tunnelstitch_core::PROGRAM;
 
 /// Name of the refined poses.
 const POSES_FILE: &str = "poses.tum";
+/// Name of the refined poses of a rig's body.
+const BODY_FILE: &str = "poses_body.tum";
 /// Name of the covariances.
 const COVARIANCE_FILE: &str = "covariance.csv";
 /// Name of the wall's shape.
@@ -45,7 +47,8 @@ pub const REFINED_FILES: [&str; 5] = [
 ];
 
 /// Files that a refinement writes if it has found something for them, and removes otherwise.
-pub const FOUND_FILES: [&str; 5] = [
+pub const FOUND_FILES: [&str; 6] = [
+    BODY_FILE,
     MASKED_FILE,
     OVERLAY_FILE,
     CAMERA_FILE,
@@ -109,6 +112,11 @@ pub fn stage_refined(
     })?;
     let mut outputs = OutputSet::default();
     outputs.write_text(&out.join(POSES_FILE), &tum::format(&refined.trajectory))?;
+    let bodies = out.join(BODY_FILE);
+    match &refined.bodies {
+        Some(poses) => outputs.write_text(&bodies, &tum::format(poses))?,
+        None => outputs.remove(&bodies)?,
+    }
     outputs.write_text(&out.join(REFINEMENT_FILE), &json)?;
     let sigmas: Vec<_> = refined
         .report
@@ -186,11 +194,14 @@ fn add_survey(
         Some(text) => outputs.write_text(&out.join(file), &text),
         None => outputs.remove(&out.join(file)),
     };
-    let camera = calibration.map(|calibration| format_calibration(&calibration.camera));
+    // The cameras of a rig are as given.
+    let of_camera = calibration.filter(|_| !survey.cameras.is_rig());
+    let camera = of_camera.map(|calibration| format_calibration(&calibration.camera));
     text_of(CAMERA_FILE, camera)?;
     let is_found = refined.shape.is_some() || refined.bend.is_some();
     let file = survey.as_found(&FoundFiles {
-        calibration: calibration.map(|calibration| (CAMERA_FILE, calibration.radius_m)),
+        camera_file: of_camera.map(|_| CAMERA_FILE),
+        radius_m: calibration.map(|calibration| calibration.radius_m),
         shape_file: is_found.then_some(SHAPE_FILE),
     });
     let (shape, sections) = match (&refined.shape, refined.bend) {

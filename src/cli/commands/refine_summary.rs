@@ -93,6 +93,9 @@ fn print_findings(report: &RefineReport, terminal: &Terminal) {
     if let Some(rows) = report.rolling_shutter.filter(|rows| rows.systematic) {
         terminal.warn(rolling_shutter_warning(&rows));
     }
+    for mount in &report.mounts {
+        terminal.say(format!("  {}", mount.sentence()));
+    }
     for finding in &report.prior_test.findings {
         terminal.warn(format!("  {finding}"));
     }

@@ -10,7 +10,7 @@ use crate::cli::output::{
 };
 use crate::files::printed;
 use crate::persist::atomic::OutputSet;
-use crate::simulate::{self, Illumination, SimulateOptions, Wall};
+use crate::simulate::{self, Illumination, RigOptions, SimulateOptions, Wall};
 use crate::survey::PriorSection;
 use crate::trajectory::JitterModel;
 use clap::ValueEnum;
@@ -37,6 +37,7 @@ use std::path::{Path, PathBuf};
     tunnelstitch simulate free --interval-s 0.333 --readout-ms 20 --out rolling\n  \
     tunnelstitch simulate free --lamp-offset-m 0.1,0,0 --sheen-percent 20 --overlay both \
     --gamma 2.2 --motion-blur-px 3 --jpeg-quality 80 --out real\n  \
+    tunnelstitch simulate free --rig 3 --frames 60 --out rig\n  \
     tunnelstitch simulate free --view forward --lamp-offset-m 0,0,0 --out forward\n  \
     tunnelstitch simulate free --turns 2 --moving 8 --bad-frames 5:black,18-20:missing --out bad"
 )]
@@ -85,6 +86,15 @@ pub struct SimulateArguments {
     /// accepts.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "fov_deg", "k1", "k2"])]
     camera: Option<PathBuf>,
+    /// Number of cameras of a rig: each takes a frame at every moment, and --frames counts the
+    /// moments. They are spread about the carrier's axis (with --view forward about the vertical of
+    /// the picture, so that the second of two looks back) and differ a little; the poses are those
+    /// of the rig's body, and survey.toml has a table of each camera.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=16))]
+    rig: Option<u32>,
+    /// Angle between the first and the last camera of the rig, degrees [default: all around].
+    #[arg(long, value_name = "DEG", requires = "rig")]
+    rig_spread_deg: Option<f64>,
     /// Width and height of the frames, pixels.
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = picture_size)]
     size: [u32; 2],
@@ -210,6 +220,10 @@ impl SimulateArguments {
             readout_ms: self.readout_ms,
             tunnel: self.tunnel.section(),
             camera,
+            rig: self.rig.map(|cameras| RigOptions {
+                cameras,
+                spread_deg: self.rig_spread_deg,
+            }),
             jitter: self.jitter(preset.jitter),
             wall,
             light: match self.light {
@@ -330,7 +344,7 @@ pub fn run(
 
 /// Number of frames that are written.
 fn frame_count(options: &SimulateOptions) -> usize {
-    options.frames - options.bad_frames.missing_count()
+    options.pictures() - options.bad_frames.missing_count()
 }
 
 /// The work of simulating a survey from `inputs` into the folder `out`.

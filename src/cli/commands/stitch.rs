@@ -124,7 +124,7 @@ pub fn run(
     };
     let mut stitch = Stitch::new(
         survey.surface.as_ref(),
-        &survey.camera,
+        &survey.cameras,
         &survey.frames,
         &poses_of(&trajectory),
         &survey.shutter(),
@@ -297,7 +297,7 @@ impl StitchRun<'_> {
             &mut outputs,
             plan,
             gaps,
-            &self.survey.camera,
+            &self.survey.cameras,
             covariances,
             wall,
         )?;

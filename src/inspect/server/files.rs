@@ -1,6 +1,5 @@
 //! Responses with files of the folder and with frames.
 
-use crate::camera::Camera;
 use crate::files::read_regular;
 use crate::frames::{FrameFile, load_colour};
 use crate::inspect::server::response::Response;
@@ -51,22 +50,23 @@ pub(super) fn read_file(folder: &Path, path: &str) -> Response {
 }
 
 /// Reads a frame: the file itself if browsers can show it, else the decoded image as PNG.
-pub(super) fn read_frame(frame: &FrameFile, camera: &Camera) -> Response {
+pub(super) fn read_frame(frame: &FrameFile, size: [u32; 2]) -> Response {
     let bytes = read_regular(&frame.path, MAX_FILE_BYTES).unwrap_or_default();
     let kind = match image::guess_format(&bytes) {
         Ok(ImageFormat::Jpeg) => "image/jpeg",
         Ok(ImageFormat::Png) => "image/png",
         Ok(ImageFormat::WebP) => "image/webp",
         // Another format, or a frame of a video.
-        _ => return decode_frame(frame, camera),
+        _ => return decode_frame(frame, size),
     };
     Response::ok(kind, bytes)
 }
 
 /// Decodes a frame and encodes it as PNG.
-fn decode_frame(frame: &FrameFile, camera: &Camera) -> Response {
+fn decode_frame(frame: &FrameFile, size: [u32; 2]) -> Response {
     let mut png = Cursor::new(Vec::new());
-    let image = match load_colour(frame, camera.width, camera.height) {
+    let [width, height] = size;
+    let image = match load_colour(frame, width, height) {
         Ok(image) => image.into_rgb8(),
         Err(error) => return Response::refuse(404, &error.to_string()),
     };

@@ -1,6 +1,6 @@
 //! HTTP server of the viewer: connections and routes.
 
-use crate::camera::Camera;
+use crate::camera::Cameras;
 use crate::frames::FrameSet;
 use crate::inspect::error::InspectError;
 use crate::inspect::mark::Mark;
@@ -36,8 +36,8 @@ const MAX_DRAINED_BYTES: u64 = 8 << 20;
 pub struct SourceFrames {
     /// The tunnel.
     pub surface: std::sync::Arc<dyn Surface>,
-    /// The camera.
-    pub camera: Camera,
+    /// The cameras.
+    pub cameras: Cameras,
     /// The frames.
     pub frames: FrameSet,
     /// Names of the layers with the placements of the frames.
@@ -255,8 +255,8 @@ impl Server {
         let wall = WallPoint { s_m, h_m };
         let found = sightings(
             source_frames.surface.as_ref(),
-            &source_frames.camera,
-            source_frames.frames.mask().map(AsRef::as_ref),
+            &source_frames.cameras,
+            source_frames.frames.masks(),
             placements,
             wall,
         );
@@ -265,12 +265,15 @@ impl Server {
 
     /// Responds with the image of a frame.
     fn frame(&self, index: &str) -> Response {
-        let Some(SourceFrames { camera, frames, .. }) = &self.source_frames else {
+        let Some(SourceFrames {
+            cameras, frames, ..
+        }) = &self.source_frames
+        else {
             return Response::not_found();
         };
         let frame = index.parse::<usize>().ok().and_then(|k| frames.get(k));
         frame.map_or_else(Response::not_found, |frame| {
-            files::read_frame(frame, camera)
+            files::read_frame(frame, cameras.size())
         })
     }
 }

@@ -142,7 +142,7 @@ pub fn transform(
 
 /// The calibration of a survey as `sensor_msgs/CameraInfo`.
 fn camera_info(wire: Wire, survey: &Survey) -> Message {
-    let camera = &survey.camera;
+    let camera = survey.cameras.of(0);
     let fields = Fields::stamped(wire, 0.0).u32(camera.height);
     let fields = fields.u32(camera.width).text("plumb_bob");
     let fields = fields.u32(5).f64s(&[0.0; 5]);

@@ -6,12 +6,11 @@ use super::frame_set::FrameSet;
 use super::grey::GreyImage;
 use super::light::{CameraLight, Light};
 use super::local_normalisation::normalise_locally;
-use super::mask::{Mask, PyramidMask};
+use super::masks::Masks;
 use super::pyramid::Pyramid;
 use super::stored_frame::StoredFrame;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
-use tunnelstitch_geometry::camera::Camera;
 
 /// Fraction of the memory used for pyramids if not all of them fit; the rest holds stored frames.
 const PYRAMID_MEMORY_FRACTION: f64 = 0.25;
@@ -40,8 +39,9 @@ pub struct FrameCache {
 
 #[derive(Debug)]
 enum Source {
-    Files(FrameSet, Box<Camera>),
-    Memory(Vec<Arc<Pyramid>>, Option<Arc<Mask>>),
+    /// With width and height of the pictures, pixels.
+    Files(FrameSet, [u32; 2]),
+    Memory(Vec<Arc<Pyramid>>, Masks),
 }
 
 /// The most recently used pyramids.
@@ -60,10 +60,10 @@ struct StoredFrames {
 }
 
 impl FrameCache {
-    /// Creates a cache of the `frames` of `camera`, with `levels` pyramid levels each, in at most
-    /// `bytes` of memory, but at least one pyramid.
-    pub fn new(frames: &FrameSet, camera: &Camera, levels: usize, bytes: usize) -> Self {
-        let pixels = f64::from(camera.width) * f64::from(camera.height);
+    /// Creates a cache of the `frames`, pictures of `size` (width and height, pixels), with
+    /// `levels` pyramid levels each, in at most `bytes` of memory, but at least one pyramid.
+    pub fn new(frames: &FrameSet, size: [u32; 2], levels: usize, bytes: usize) -> Self {
+        let pixels = f64::from(size[0]) * f64::from(size[1]);
         let pyramids =
             |share: f64| (share * bytes as f64 / (PYRAMID_BYTES_PER_PIXEL * pixels)) as usize;
         let (room, stored) = if pyramids(1.0) >= frames.len() {
@@ -75,7 +75,7 @@ impl FrameCache {
             )
         };
         Self {
-            source: Source::Files(frames.clone(), Box::new(*camera)),
+            source: Source::Files(frames.clone(), size),
             levels,
             light: RwLock::default(),
             room: room.max(1),
@@ -89,26 +89,26 @@ impl FrameCache {
 
     /// Creates a cache of pyramids that are in memory already.
     pub fn of_pyramids(pyramids: Vec<Pyramid>) -> Self {
-        Self::in_memory(pyramids.into_iter().map(Arc::new).collect(), None)
+        Self::in_memory(pyramids.into_iter().map(Arc::new).collect(), Masks::NONE)
     }
 
-    /// Pictures that are black all over in place of `frames`, of the size of `camera` (at any
-    /// pyramid level of theirs), with their mask; nothing is read.
-    pub fn blank(frames: &FrameSet, camera: &Camera) -> Self {
-        let (width, height) = (camera.width as usize, camera.height as usize);
+    /// Pictures that are black all over in place of `frames`, of `size` (width and height at any
+    /// pyramid level of theirs), with their masks; nothing is read.
+    pub fn blank(frames: &FrameSet, size: [u32; 2]) -> Self {
+        let [width, height] = size.map(|side| side as usize);
         let black = GreyImage::new(width, height, vec![0.0; width * height]);
         let black = Arc::new(Pyramid::new(black, 1));
-        Self::in_memory(vec![black; frames.len()], frames.mask().map(Arc::clone))
+        Self::in_memory(vec![black; frames.len()], frames.masks().clone())
     }
 
-    fn in_memory(pyramids: Vec<Arc<Pyramid>>, mask: Option<Arc<Mask>>) -> Self {
+    fn in_memory(pyramids: Vec<Arc<Pyramid>>, masks: Masks) -> Self {
         Self {
             levels: 1,
             light: RwLock::default(),
             room: pyramids.len(),
             shelf: Mutex::default(),
             stored: Mutex::default(),
-            source: Source::Memory(pyramids, mask),
+            source: Source::Memory(pyramids, masks),
         }
     }
 
@@ -120,13 +120,12 @@ impl FrameCache {
         }
     }
 
-    /// The mask at the pyramid level of `camera`; None if there is no mask.
-    pub fn mask(&self, camera: &Camera) -> Option<PyramidMask> {
-        let mask = match &self.source {
-            Source::Files(frames, _) => frames.mask(),
-            Source::Memory(_, mask) => mask.as_ref(),
-        };
-        mask.map(|mask| PyramidMask::for_camera(Arc::clone(mask), camera))
+    /// The frames' masks.
+    pub fn masks(&self) -> &Masks {
+        match &self.source {
+            Source::Files(frames, _) => frames.masks(),
+            Source::Memory(_, masks) => masks,
+        }
     }
 
     /// Largest number of pyramids held at once.
@@ -167,8 +166,8 @@ impl FrameCache {
     /// # Errors
     /// The errors of [`StoredFrame::decode`].
     pub fn get(&self, frame: usize) -> Result<Arc<Pyramid>, FrameError> {
-        let (frames, camera) = match &self.source {
-            Source::Files(frames, camera) => (frames, camera),
+        let (frames, size) = match &self.source {
+            Source::Files(frames, size) => (frames, *size),
             Source::Memory(pyramids, _) => return Ok(Arc::clone(&pyramids[frame])),
         };
         {
@@ -182,8 +181,8 @@ impl FrameCache {
         }
         // Decoded without holding the lock; if two threads decode the same frame, one result is
         // dropped.
-        let mut image = self.stored(&frames[frame], camera)?.grey();
-        if let Some(mask) = frames.mask() {
+        let mut image = self.stored(&frames[frame], size)?.grey();
+        if let Some(mask) = frames.masks().of(frame) {
             mask.blank(&mut image);
         }
         match self.light() {
@@ -206,11 +205,15 @@ impl FrameCache {
     }
 
     /// A frame in the form of its file; kept if there is memory.
-    fn stored(&self, file: &FrameFile, camera: &Camera) -> Result<Arc<StoredFrame>, FrameError> {
+    fn stored(
+        &self,
+        file: &FrameFile,
+        [width, height]: [u32; 2],
+    ) -> Result<Arc<StoredFrame>, FrameError> {
         if let Some(frame) = lock(&self.stored).kept.get(&file.index) {
             return Ok(Arc::clone(frame));
         }
-        let frame = Arc::new(StoredFrame::decode(file, camera.width, camera.height)?);
+        let frame = Arc::new(StoredFrame::decode(file, width, height)?);
         let mut store = lock(&self.stored);
         if let Some(left) = store.room.checked_sub(frame.bytes())
             && store.kept.insert(file.index, Arc::clone(&frame)).is_none()
@@ -245,10 +248,9 @@ mod tests {
     #[test]
     fn no_more_is_kept_than_there_is_room_for() {
         let folder = tempfile::tempdir().unwrap();
-        let camera = Camera::from_vertical_fov(32, 24, 1.0);
         let files = files(folder.path());
         // Three quarters for three stored frames, the rest for a pyramid.
-        let cache = FrameCache::new(&files, &camera, 2, 4 * 32 * 24);
+        let cache = FrameCache::new(&files, [32, 24], 2, 4 * 32 * 24);
         let get = |frame: usize| Ok::<_, FrameError>(cache.get(frame)?.level(0).at(3, 3));
         for frame in [0, 1, 2, 0, 3, 4, 0] {
             assert_eq!(get(frame).unwrap(), 10.0 + frame as f32);
@@ -267,10 +269,9 @@ mod tests {
     #[test]
     fn a_frame_that_is_gone_is_an_error_that_names_it() {
         let folder = tempfile::tempdir().unwrap();
-        let camera = Camera::from_vertical_fov(32, 24, 1.0);
         let files = files(folder.path());
         std::fs::remove_file(&files[3].path).unwrap();
-        let cache = FrameCache::new(&files, &camera, 1, 0);
+        let cache = FrameCache::new(&files, [32, 24], 1, 0);
         let error = cache.get(3).unwrap_err().to_string();
         assert!(error.contains("frame 3"), "{error}");
     }

@@ -43,6 +43,8 @@ pub struct FrameFile {
     pub path: PathBuf,
     /// Its pixels.
     pub(super) source: FrameSource,
+    /// The folder that its name begins in; its own if it is none of a rig.
+    named_from: Option<Arc<Path>>,
 }
 
 impl FrameFile {
@@ -52,6 +54,7 @@ impl FrameFile {
             index,
             path,
             source: FrameSource::File(PictureReading::default()),
+            named_from: None,
         }
     }
 
@@ -77,6 +80,7 @@ impl FrameFile {
             index,
             path: video.path().join(format!("{picture:06}")),
             source: FrameSource::Video(Arc::clone(video), picture),
+            named_from: None,
         }
     }
 
@@ -87,6 +91,7 @@ impl FrameFile {
             index,
             path: images.name(image),
             source: FrameSource::Recording(Arc::clone(images), image, reading),
+            named_from: None,
         }
     }
 
@@ -96,6 +101,7 @@ impl FrameFile {
             index,
             path: PathBuf::from(format!("frame-{index:06}")),
             source: FrameSource::Memory(Arc::new(picture)),
+            named_from: None,
         }
     }
 
@@ -153,10 +159,26 @@ impl FrameFile {
         }
     }
 
-    /// The file name of the picture.
+    /// The frame with another index.
+    pub fn numbered(self, index: usize) -> Self {
+        Self { index, ..self }
+    }
+
+    /// The frame with a name that begins in `folder`, so that it differs from those of other
+    /// cameras.
+    pub fn named_from(mut self, folder: &Arc<Path>) -> Self {
+        self.named_from = Some(Arc::clone(folder));
+        self
+    }
+
+    /// The file name of the picture; in a rig, with the folders in which those of its cameras are.
     pub fn name(&self) -> String {
-        let name = self.path.file_name().unwrap_or_default();
-        name.to_string_lossy().into_owned()
+        let folder = self.named_from.as_deref();
+        let within = folder.and_then(|folder| self.path.strip_prefix(folder).ok());
+        let own = || self.path.file_name().map(Path::new);
+        let name = within.or_else(own).unwrap_or(Path::new(""));
+        let separator = std::path::MAIN_SEPARATOR;
+        name.to_string_lossy().replace(separator, "/")
     }
 }
 

@@ -1,24 +1,24 @@
-//! The frames of a survey with their common mask.
+//! The frames of a survey with their masks.
 
 use super::frame_file::FrameFile;
 use super::mask::Mask;
+use super::masks::Masks;
 use image::DynamicImage;
 use std::ops::Deref;
-use std::sync::Arc;
 
-/// The frames of a survey, in order, and their common [`Mask`], if any.
+/// The frames of a survey, in order, and their [`Masks`], if any.
 #[derive(Clone, Debug, Default)]
 pub struct FrameSet {
     files: Vec<FrameFile>,
-    mask: Option<Arc<Mask>>,
+    masks: Masks,
 }
 
 impl FrameSet {
-    /// Creates a set of frames with a common mask.
-    pub fn new(files: Vec<FrameFile>, mask: Option<Mask>) -> Self {
+    /// Creates a set of frames with a common mask, or with those of their cameras.
+    pub fn new(files: Vec<FrameFile>, masks: impl Into<Masks>) -> Self {
         Self {
             files,
-            mask: mask.map(Arc::new),
+            masks: masks.into(),
         }
     }
 
@@ -26,33 +26,27 @@ impl FrameSet {
     pub fn in_memory(pictures: impl IntoIterator<Item = DynamicImage>) -> Self {
         let numbered = pictures.into_iter().enumerate();
         let files = numbered.map(|(index, picture)| FrameFile::in_memory(index, picture));
-        Self::new(files.collect(), None)
+        Self::new(files.collect(), Masks::NONE)
     }
 
-    /// The common mask.
-    pub fn mask(&self) -> Option<&Arc<Mask>> {
-        self.mask.as_ref()
+    /// The masks.
+    pub fn masks(&self) -> &Masks {
+        &self.masks
     }
 
-    /// Also hides the pixels of `mask`.
+    /// Also hides the pixels of `mask` in all frames.
     pub fn hide(&mut self, mask: &Mask) {
-        let united = match &self.mask {
-            Some(own) => own.union(mask),
-            None => mask.clone(),
-        };
-        self.mask = Some(Arc::new(united));
+        self.masks.hide(mask);
     }
 
     /// The frames of the given indices, renumbered.
     pub fn only(&self, indices: &[usize]) -> Self {
         let chosen = indices.iter().filter_map(|k| self.files.get(*k));
-        let numbered = chosen.enumerate().map(|(index, file)| FrameFile {
-            index,
-            ..file.clone()
-        });
+        let numbered = chosen.enumerate();
+        let numbered = numbered.map(|(index, file)| file.clone().numbered(index));
         Self {
             files: numbered.collect(),
-            mask: self.mask.clone(),
+            masks: self.masks.of_frames(indices),
         }
     }
 
@@ -60,14 +54,14 @@ impl FrameSet {
     pub fn first(&self, most: usize) -> Self {
         Self {
             files: self.files.iter().take(most).cloned().collect(),
-            mask: self.mask.clone(),
+            masks: self.masks.clone(),
         }
     }
 }
 
 impl From<Vec<FrameFile>> for FrameSet {
     fn from(files: Vec<FrameFile>) -> Self {
-        Self::new(files, None)
+        Self::new(files, Masks::NONE)
     }
 }
 

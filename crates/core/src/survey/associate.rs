@@ -102,8 +102,9 @@ pub(super) fn by_name(
     }
     let of_frame = |frame: &FrameFile| {
         let stem = frame.path.file_stem().unwrap_or_default().to_string_lossy();
+        let name = frame.path.file_name().unwrap_or_default().to_string_lossy();
         let same = named
-            .get(&frame.name())
+            .get(name.as_ref())
             .or_else(|| named.get(stem.as_ref()))
             .map_or(&[][..], Vec::as_slice);
         let entry = match same {

@@ -7,8 +7,10 @@ use std::path::Path;
 /// Files that refine has written beside a survey.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FoundFiles<'f> {
-    /// The refined calibration, and the radius that goes with it, metres.
-    pub calibration: Option<(&'f str, f64)>,
+    /// The refined calibration of a single camera.
+    pub camera_file: Option<&'f str>,
+    /// The refined radius, metres.
+    pub radius_m: Option<f64>,
     /// The shape of the wall.
     pub shape_file: Option<&'f str>,
 }
@@ -24,16 +26,21 @@ impl Survey {
         for path in file.paths_mut() {
             *path = folder.join(&*path);
         }
-        if let Some((camera_file, radius_m)) = found.calibration {
-            if file.tunnel.is_straight_and_round() {
-                file.tunnel.radius_m = Some(radius_m);
-            }
-            file.camera.file = Some(camera_file.into());
-            file.camera.horizontal_fov_deg = None;
-            file.camera.name = None;
+        if let Some(radius_m) = found.radius_m
+            && file.tunnel.is_straight_and_round()
+        {
+            file.tunnel.radius_m = Some(radius_m);
+        }
+        if let Some(camera_file) = found.camera_file {
+            let camera = file.camera.first_mut();
+            camera.file = Some(camera_file.into());
+            camera.horizontal_fov_deg = None;
+            camera.name = None;
         }
         file.tunnel.shape_file = found.shape_file.map(Into::into);
-        if let Some(images) = &mut file.frames.images {
+        let of_rig = file.camera.all_mut().iter_mut();
+        let of_rig = of_rig.filter_map(|camera| camera.frames.as_mut());
+        for images in of_rig.chain(file.frames.images.as_mut()) {
             let escaped = glob::Pattern::escape(&folder.to_string_lossy());
             let pattern = Path::new(&escaped).join(&*images);
             *images = pattern.to_string_lossy().into_owned();

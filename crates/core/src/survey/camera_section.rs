@@ -1,4 +1,4 @@
-//! `[camera]`: the camera that took the frames.
+//! `[camera]`: the camera that took the frames, or one of a rig.
 
 use super::error::SurveyError;
 use serde::{Deserialize, Serialize};
@@ -30,6 +30,16 @@ pub struct CameraSection {
     /// Distance from the camera up to which the wall is used, metres; six radii by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_range_m: Option<f64>,
+    /// Of a rig: glob pattern of the pictures that this camera took, one a moment.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames: Option<String>,
+    /// Of a rig: mask of this camera's pictures, instead of that under `[frames]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mask: Option<PathBuf>,
+    /// Of a rig: the motion from the body whose poses the files hold to this camera; see
+    /// [`read_camera_in_body`](tunnelstitch_geometry::trajectory::read_camera_in_body).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_to_camera: Option<PathBuf>,
 }
 
 impl CameraSection {
@@ -39,6 +49,33 @@ impl CameraSection {
             file: Some(file.into()),
             ..Self::default()
         }
+    }
+
+    /// Checks a camera that is none of a rig; `has_rig`: there is a section `[rig]`. Returns what
+    /// is wrong.
+    pub(super) fn check_single(&self, has_rig: bool) -> Result<(), &'static str> {
+        if self.frames.is_some() {
+            return Err(
+                "camera.frames goes with a rig of several [[camera]]; name the frames of a single \
+                 one by images under [frames]",
+            );
+        }
+        if self.mask.is_some() {
+            return Err(
+                "camera.mask goes with a rig of several [[camera]]; put the mask of a single one \
+                 under [frames]",
+            );
+        }
+        if self.body_to_camera.is_some() {
+            return Err(
+                "camera.body_to_camera goes with a rig of several [[camera]]; put that of a \
+                 single one under [poses]",
+            );
+        }
+        if has_rig {
+            return Err("[rig] goes with several [[camera]], and there is a single one");
+        }
+        Ok(())
     }
 
     /// The camera of a survey in `folder`, whose file is `toml`; `picture_size` gives width and

@@ -1,9 +1,10 @@
 //! The content of `survey.toml`.
 
 use super::calibrate::CalibrateSection;
-use super::camera_section::CameraSection;
+use super::camera_sections::CameraSections;
 use super::error::SurveyError;
 use super::poses_section::PosesSection;
+use super::rig_section::RigSection;
 use super::tunnel::TunnelSection;
 use crate::frames::PictureOrientation;
 use serde::{Deserialize, Serialize};
@@ -22,9 +23,13 @@ pub const SURVEY_FILE: &str = "survey.toml";
 pub struct SurveyFile {
     /// The tunnel.
     pub tunnel: TunnelSection,
-    /// The camera.
-    pub camera: CameraSection,
-    /// The frames.
+    /// The camera, or those of a rig.
+    pub camera: CameraSections,
+    /// Relation of the cameras of a rig.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rig: Option<RigSection>,
+    /// The frames; those of a rig are named by its cameras.
+    #[serde(default)]
     pub frames: FramesSection,
     /// The poses.
     pub poses: PosesSection,
@@ -44,11 +49,17 @@ impl SurveyFile {
     /// All paths in the file, except those of the frames.
     pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let poses = &mut self.poses;
+        let of_cameras = self.camera.all_mut().iter_mut().flat_map(|camera| {
+            [
+                camera.file.as_mut(),
+                camera.mask.as_mut(),
+                camera.body_to_camera.as_mut(),
+            ]
+        });
         [
             self.tunnel.centreline.as_mut(),
             self.tunnel.shape_file.as_mut(),
             self.tunnel.points.as_mut(),
-            self.camera.file.as_mut(),
             self.frames.times.as_mut(),
             self.frames.mask.as_mut(),
             Some(&mut poses.initial),
@@ -57,12 +68,26 @@ impl SurveyFile {
             poses.tunnel_frame.as_mut(),
         ]
         .into_iter()
+        .chain(of_cameras)
         .flatten()
+    }
+
+    /// The section of the frames that camera `camera` took.
+    pub(super) fn frames_of(&self, camera: usize) -> FramesSection {
+        let section = &self.camera.all()[camera];
+        let own = self.frames.clone();
+        FramesSection {
+            images: section.frames.clone().or(own.images),
+            mask: section.mask.clone().or(own.mask),
+            // The times are those of the moments.
+            times: own.times.filter(|_| camera == 0),
+            ..own
+        }
     }
 }
 
 /// `[frames]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FramesSection {
     /// Glob pattern of the frames, if they are files of their own.
@@ -183,6 +208,7 @@ mod tests {
     use super::*;
     use crate::survey::associate::Associate;
     use crate::survey::calibrate::CalibrationGroup;
+    use crate::survey::camera_section::CameraSection;
     use crate::survey::ignore::IgnoreSection;
     use crate::survey::open::Survey;
     use crate::survey::tunnel::Shape;
@@ -209,12 +235,12 @@ mod tests {
                 }],
             },
             camera: CameraSection {
-                file: Some("camera.json".into()),
-                name: None,
-                horizontal_fov_deg: None,
                 readout_ms: Some(-20.0),
                 max_range_m: Some(9.0),
-            },
+                ..CameraSection::of_file("camera.json")
+            }
+            .into(),
+            rig: None,
             frames: FramesSection {
                 images: None,
                 video: Some("survey.mp4".into()),

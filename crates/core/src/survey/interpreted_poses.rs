@@ -3,7 +3,7 @@
 use super::missing_poses::PoseGap;
 use super::pose_conflicts::FrameConflict;
 use tunnelstitch_geometry::trajectory::{
-    Convention, Pose, PoseFormat, StampedPose, Trajectory, poses_of,
+    Convention, Pose, PoseFormat, Rig, StampedPose, Trajectory, poses_of,
 };
 
 /// The poses of a file, one per frame, with their convention.
@@ -11,6 +11,8 @@ use tunnelstitch_geometry::trajectory::{
 pub(super) struct InterpretedPoses {
     /// The poses in the file's convention.
     pub given: Trajectory,
+    /// True if they are of all pictures of a rig, moment by moment, instead of its body.
+    pub of_pictures: bool,
     /// The convention.
     pub convention: Convention,
     /// The file's format.
@@ -41,6 +43,25 @@ impl InterpretedPoses {
         poses_of(&self.trajectory_in(convention))
     }
 
+    /// The poses of camera `camera` of a rig, one a moment.
+    pub fn of_camera(&self, camera: usize, rig: &Rig) -> Self {
+        if self.of_pictures {
+            let own = self.given.iter().skip(camera).step_by(rig.cameras());
+            return Self {
+                given: own.copied().collect(),
+                of_pictures: false,
+                ..self.clone()
+            };
+        }
+        Self {
+            convention: Convention {
+                camera_in_body: Some(rig.mounts()[camera]),
+                ..self.convention
+            },
+            ..self.clone()
+        }
+    }
+
     /// The file's poses with positions of another unit, metres.
     pub fn in_unit(&self, unit_m: f64) -> Self {
         self.changed(|pose| Pose::new(pose.r_wc, pose.t_wc * unit_m))
@@ -64,6 +85,7 @@ impl InterpretedPoses {
             given: stamped
                 .map(|(time_s, pose)| StampedPose { time_s, pose })
                 .collect(),
+            of_pictures: self.of_pictures,
             convention: self.convention,
             format: self.format,
             gaps: self.gaps.clone(),

@@ -19,6 +19,16 @@
 //! readout_ms = 20.0           # optional: rolling shutter, from the first row to the last
 //! max_range_m = 18.0          # optional: farther wall is not used; 6 radii by default
 //!
+//! # Or, of a rig, a table for each camera, with poses of its body:
+//! # [[camera]]
+//! # file = "left.json"
+//! # frames = "left/*.png"     # its pictures, one a moment
+//! # body_to_camera = "left.txt"
+//! # mask = "left-mask.png"    # optional
+//! # [rig]                     # optional: 1-σ of the mounts
+//! # rotation_sigma_deg = 0.05
+//! # translation_sigma_mm = 1.0
+//!
 //! [frames]
 //! images = "frames/*.jpg"     # sorted by name; or
 //! # video = "survey.mp4"      # pictures of a video, read by ffmpeg, with its times
@@ -86,6 +96,7 @@ mod associate;
 mod calibrate;
 mod calibrated;
 mod camera_section;
+mod camera_sections;
 mod capture_times;
 mod discover;
 mod error;
@@ -112,9 +123,11 @@ mod pose_validation;
 mod poses_section;
 mod readout;
 mod recorded_parts;
+mod rig_section;
 mod shape_file;
 mod skipped_frame;
 mod straight_axis;
+mod taken_frames;
 mod template;
 mod tunnel;
 mod unposed_frames;
@@ -124,6 +137,7 @@ pub use associate::{Associate, TIME_TOLERANCE_S};
 pub use calibrate::{CalibrateSection, CalibrationGroup};
 pub use calibrated::FoundFiles;
 pub use camera_section::CameraSection;
+pub use camera_sections::CameraSections;
 pub use capture_times::FrameTimes;
 pub use discover::{Discovery, VideoChoice};
 pub use error::SurveyError;
@@ -140,6 +154,7 @@ pub use picture_group::PictureGroup;
 pub use pose_readings::PoseReading;
 pub use poses_section::PosesSection;
 pub use recorded_parts::{RecordedFrames, RecordedParts};
+pub use rig_section::RigSection;
 pub use shape_file::ShapeFile;
 pub use skipped_frame::SkippedFrame;
 pub use straight_axis::{AXIS_FILE, FoundAxis};

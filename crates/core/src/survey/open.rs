@@ -4,8 +4,6 @@ use super::associate::TIME_TOLERANCE_S;
 use super::error::SurveyError;
 use super::file::read_survey_file;
 use super::file::{SURVEY_FILE, SurveyFile};
-use super::frame_list::FrameList;
-use super::frame_skipping::skip_unreadable;
 use super::masked_wall::MaskedWall;
 use super::missing_poses::{self, MissingPoses, PoseGap};
 use super::pose_conflicts;
@@ -14,17 +12,16 @@ use super::poses_section::PosesSection;
 use super::readout::readout_warning;
 use super::shape_file::ShapeFile;
 use super::skipped_frame::{self, SkippedFrame};
+use super::taken_frames::{SurveyPlace, TakenFrames};
 use super::{ignore, pose_validation};
-use crate::frames::{FrameSet, Mask, Video};
+use crate::frames::{FrameFile, FrameSet, Video};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::files::printed;
-use tunnelstitch_geometry::surface::{
-    Bend, RadialField, Surface, WallRegions, bent, displaced, with_range,
-};
+use tunnelstitch_geometry::surface::{Bend, RadialField, Surface, WallRegions, bent, displaced};
 use tunnelstitch_geometry::trajectory::{
-    Jitter, MAX_SEARCH_VOLUME_DEG3, Pose, Shutter, StampedPose, Trajectory, poses_of,
+    Jitter, MAX_SEARCH_VOLUME_DEG3, Pose, Rig, Shutter, StampedPose, Trajectory, poses_of,
     read_tunnel_frame,
 };
 
@@ -35,8 +32,10 @@ pub struct Survey {
     pub folder: PathBuf,
     /// The content of `survey.toml`.
     pub file: SurveyFile,
-    /// The camera.
-    pub camera: Camera,
+    /// The cameras.
+    pub cameras: Cameras,
+    /// The relation of the cameras, if there are several.
+    pub rig: Option<Rig>,
     /// The tunnel.
     pub surface: Arc<dyn Surface>,
     /// The tunnel without the displacement of `shape_file`, but with its bend.
@@ -51,7 +50,7 @@ pub struct Survey {
     pub radius_sigma: f64,
     /// Regions of the wall that are excluded from the comparison of frames.
     pub ignored: WallRegions,
-    /// The frames, sorted by name, with their common mask.
+    /// The frames, sorted by name, with their masks; those of a rig moment by moment.
     pub frames: FrameSet,
     /// The frames that are left out because they cannot be read (`frames.skip_bad`).
     pub skipped: Vec<SkippedFrame>,
@@ -66,8 +65,10 @@ pub struct Survey {
     pub prior: Jitter,
     /// Warnings about suspicious data, with a probable cause.
     pub warnings: Vec<String>,
-    /// The frames' times, seconds, if given by a file or a video.
+    /// The frames' times, for a rig those of the moments, seconds, if given by a file or a video.
     pub(super) times_s: Option<Vec<f64>>,
+    /// The frames of the first camera of a rig; empty for a single camera.
+    moments: Vec<FrameFile>,
     /// See [`Survey::own_files`].
     own_files: Vec<PathBuf>,
 }
@@ -127,31 +128,28 @@ impl Survey {
         let displacement = found.and_then(|found| found.displacement());
         let surface = displaced(&nominal, displacement.clone());
         check_values(&file).map_err(value)?;
-        let picture_size = || FrameList::first_size(&file.frames, &toml_path, &folder);
-        let camera = file.camera.camera(&toml_path, &folder, &picture_size)?;
-        let camera = with_range(&camera, surface.as_ref());
-        let listed = FrameList::new(&file.frames, &toml_path, &folder, None)?;
-        let size = (camera.width, camera.height);
-        let (listed, orientation_warning) = listed.oriented(size, &file.frames);
-        let (listed, skipped) = match file.frames.skip_bad {
-            Some(true) => skip_unreadable(listed, size)?,
-            _ => (listed, Vec::new()),
+        let place = SurveyPlace {
+            file: &file,
+            toml_path: &toml_path,
+            folder: &folder,
         };
-        let FrameList {
+        let TakenFrames {
+            cameras,
             frames,
+            rig,
+            moments,
+            skipped,
             times_s,
             video,
-        } = listed;
+            warnings: picture_warnings,
+        } = place.take_frames(surface.as_ref())?;
         if let Some(video) = &video {
             check_displayed_rows(video, &file).map_err(value)?;
         }
-        let mask = match &file.frames.mask {
-            Some(mask) => Some(Mask::read(&folder.join(mask), camera.width, camera.height)?),
-            None => None,
-        };
         let ignored = ignore::wall_regions(&file.tunnel.ignore, surface.as_ref()).map_err(value)?;
         let mut survey = Self {
-            camera,
+            cameras,
+            rig,
             surface,
             nominal,
             bend,
@@ -159,7 +157,7 @@ impl Survey {
             shape_sigma_m,
             radius_sigma,
             ignored,
-            frames: FrameSet::new(frames, mask),
+            frames,
             skipped,
             initial: Vec::new(),
             pose_gaps: Vec::new(),
@@ -167,6 +165,7 @@ impl Survey {
             prior: file.prior.into(),
             warnings: Vec::new(),
             times_s,
+            moments,
             own_files,
             folder,
             file,
@@ -206,8 +205,10 @@ impl Survey {
             }
             None => None,
         };
-        warnings.extend(readout_warning(&survey.file.camera, &survey.folder));
-        warnings.extend(orientation_warning);
+        for section in survey.file.camera.all() {
+            warnings.extend(readout_warning(section, &survey.folder));
+        }
+        warnings.extend(picture_warnings);
         warnings.extend(survey.skipped_sentence());
         warnings.extend(
             video
@@ -254,25 +255,55 @@ impl Survey {
         surface: &dyn Surface,
         missing: MissingPoses,
     ) -> Result<ReadPoses, SurveyError> {
-        let reader = PoseReader::new(section, &self.folder, &self.frames_to_pose())?;
+        let to_pose = self.frames_to_pose();
+        let reader = PoseReader::new(section, &self.folder, &to_pose)?;
+        // A moment of a rig without a pose has none of any camera.
+        let missing = match self.rig {
+            Some(_) => MissingPoses::Refuse,
+            None => missing,
+        };
         let reading = reader.read(path, missing)?;
-        let trajectory = reading.trajectory();
-        let poses = poses_of(&trajectory);
-        let mut warnings =
-            pose_validation::validate_poses(surface, &self.camera, &reading, &poses, path)?;
+        let cameras = self.cameras.all().iter().enumerate();
+        let (mut warnings, mut of_cameras) = (Vec::new(), Vec::new());
+        for (k, camera) in cameras {
+            let own = match &self.rig {
+                Some(rig) => reading.of_camera(k, rig),
+                None => reading.clone(),
+            };
+            let trajectory = own.trajectory();
+            let poses = poses_of(&trajectory);
+            let of_camera = pose_validation::validate_poses(surface, camera, &own, &poses, path)
+                .map_err(|error| self.of_frame_of_camera(k, error))?;
+            warnings.extend(of_camera);
+            of_cameras.push(trajectory);
+        }
         warnings.extend(missing_poses::warning(path, &self.frames, &reading.gaps));
         let conflicts = &reading.conflicts;
-        warnings.extend(pose_conflicts::check(
-            path,
-            &self.frames,
-            conflicts,
-            &self.prior,
-        )?);
+        let in_conflict = pose_conflicts::check(path, to_pose.frames, conflicts, &self.prior)?;
+        warnings.extend(in_conflict);
         Ok(ReadPoses {
-            trajectory,
+            trajectory: in_turn(&of_cameras),
             gaps: reading.gaps,
             warnings,
         })
+    }
+
+    /// An error of a camera's poses, which are one a moment, of the survey's frames.
+    fn of_frame_of_camera(&self, camera: usize, error: SurveyError) -> SurveyError {
+        match error {
+            SurveyError::Placement {
+                path,
+                frame,
+                source,
+                remedy,
+            } => SurveyError::Placement {
+                path,
+                frame: frame * self.cameras.count() + camera,
+                source,
+                remedy,
+            },
+            other => other,
+        }
     }
 
     /// A sentence that names the frames that are left out because they cannot be read, if there are
@@ -284,7 +315,12 @@ impl Survey {
     /// The frames that poses are read for.
     pub(super) fn frames_to_pose(&self) -> FramesToPose<'_> {
         FramesToPose {
-            frames: &self.frames,
+            frames: if self.rig.is_some() {
+                &self.moments
+            } else {
+                &self.frames
+            },
+            pictures: &self.frames,
             skipped: &self.skipped,
             times_s: self.times_s.as_deref(),
         }
@@ -297,7 +333,7 @@ impl Survey {
 
     /// Checks the readout time: it cannot be longer than the time between frames.
     fn validate_readout(&self) -> Result<(), String> {
-        let Some(readout_ms) = self.file.camera.readout_ms else {
+        let Some(readout_ms) = self.file.camera.first().readout_ms else {
             return Ok(());
         };
         let steps = self
@@ -318,10 +354,15 @@ impl Survey {
         }
     }
 
-    /// The readout times of the frames' rows, from the times of the initial poses.
+    /// The readout times of the frames' rows, from the times of the initial poses; rigs have a
+    /// global shutter.
     pub fn shutter(&self) -> Shutter {
-        let readout_s = 1e-3 * self.file.camera.readout_ms.unwrap_or_default();
-        Shutter::new(readout_s, self.camera.height, &self.initial)
+        if self.rig.is_some() {
+            return Shutter::default();
+        }
+        let readout_ms = self.file.camera.first().readout_ms;
+        let readout_s = 1e-3 * readout_ms.unwrap_or_default();
+        Shutter::new(readout_s, self.cameras.size()[1], &self.initial)
     }
 
     /// Reads the file of the wall's displacement, with its uncertainty; None if the wall has none.
@@ -363,6 +404,13 @@ impl Survey {
     }
 }
 
+/// The poses of several cameras in turn, moment by moment.
+fn in_turn(of_cameras: &[Trajectory]) -> Trajectory {
+    let moments = of_cameras.iter().map(Vec::len).min().unwrap_or_default();
+    let of_moment = |k: usize| of_cameras.iter().map(move |poses| poses[k]);
+    (0..moments).flat_map(of_moment).collect()
+}
+
 /// The folder that the paths in `survey.toml` are relative to.
 pub(super) fn folder_of(toml_path: &Path) -> PathBuf {
     match toml_path.parent() {
@@ -382,7 +430,7 @@ pub fn toml_path(path: &Path) -> PathBuf {
 
 /// Checks that the rows of a rolling shutter are rows of the displayed pictures.
 fn check_displayed_rows(video: &Video, file: &SurveyFile) -> Result<(), String> {
-    if video.rotation_deg() == 0 || file.camera.readout_ms.is_none() {
+    if video.rotation_deg() == 0 || file.camera.first().readout_ms.is_none() {
         return Ok(());
     }
     Err(format!(
@@ -425,9 +473,9 @@ fn check_values(file: &SurveyFile) -> Result<(), String> {
             prior.rotation_sigma_deg, prior.translation_sigma_m
         ));
     }
-    if let Some(max_range_m) = file.camera.max_range_m
-        && !(radius_m..=1e3 * radius_m).contains(&max_range_m)
-    {
+    let ranges = file.camera.all().iter();
+    let mut ranges = ranges.filter_map(|camera| camera.max_range_m);
+    if let Some(max_range_m) = ranges.find(|m| !(radius_m..=1e3 * radius_m).contains(m)) {
         return Err(format!(
             "camera.max_range_m is {max_range_m}; it must be metres, between the radius (half the \
              width) and a thousand times that"

@@ -70,14 +70,24 @@ impl OverlayReport {
 
 impl Survey {
     /// Finds the pixels that do not move with the wall, and whether the frames are interlaced, in
-    /// up to 64 frames; the pixels are not sought if `[frames] overlay` keeps them, or if there are
-    /// too few frames between which the wall moves.
+    /// up to 64 frames; the pixels are not sought if `[frames] overlay` keeps them, if there are
+    /// too few frames between which the wall moves, or in frames of a rig.
     ///
     /// # Errors
     /// A frame that cannot be read.
     pub fn find_overlay(&self) -> Result<Overlay, FrameError> {
+        if self.cameras.is_rig() {
+            let reason = "in frames of a rig only the masks of its cameras hide them";
+            return Ok(Overlay {
+                report: OverlayReport {
+                    skipped: Some(reason.to_owned()),
+                    ..OverlayReport::default()
+                },
+                mask: None,
+            });
+        }
         let (chosen, motion) = self.moving_frames();
-        let (width, height) = (self.camera.width, self.camera.height);
+        let [width, height] = self.cameras.size();
         let decoded = chosen.as_slice().par_map(|frame| {
             let picture = StoredFrame::decode(&self.frames[*frame], width, height)?;
             let grey = picture.grey_with_clipped();
@@ -94,7 +104,7 @@ impl Survey {
         let keeps = self.file.frames.overlay == Some(OverlayUse::Keep);
         let pictures: Vec<GreyImage> = decoded.into_iter().map(|(_, grey)| grey).collect();
         let size = [width as usize, height as usize];
-        let statistics = TemporalStatistics::new(size, pictures, self.frames.mask());
+        let statistics = TemporalStatistics::new(size, pictures, self.frames.masks().of(0));
         report.frames = statistics.as_ref().map_or(0, TemporalStatistics::frames);
         let statistics = statistics.filter(|statistics| statistics.frames() >= MIN_FRAMES);
         if keeps {

@@ -1,4 +1,4 @@
-//! Motion of the wall in the pictures, by the initial poses.
+//! Motion of the wall in the pictures of a single camera, by the initial poses.
 
 use super::open::Survey;
 use crate::frames::{MotionCell, MotionField};
@@ -51,10 +51,11 @@ impl Survey {
     /// Middles of the cells of a grid over the picture, row-major.
     fn grid_pixels(&self, [columns, rows]: [usize; 2]) -> Vec<Vector2<f64>> {
         let middle = |k: usize, of: usize, px: u32| (k as f64 + 0.5) / of as f64 * f64::from(px);
+        let [width, height] = self.cameras.size();
         let pixel = |k: usize| {
             Vector2::new(
-                middle(k % columns, columns, self.camera.width) - 0.5,
-                middle(k / columns, rows, self.camera.height) - 0.5,
+                middle(k % columns, columns, width) - 0.5,
+                middle(k / columns, rows, height) - 0.5,
             )
         };
         (0..columns * rows).map(pixel).collect()
@@ -63,10 +64,11 @@ impl Survey {
     /// Motion of the wall at a pixel from one pose to the other, shares of the picture's width,
     /// extrapolated from a part of the way; None where no wall is seen.
     fn motion(&self, pixel: &Vector2<f64>, from: &Pose, to: &Pose) -> Option<[f64; 2]> {
-        let ray = from.r_wc * self.camera.ray(pixel.x, pixel.y)?;
+        let camera = self.cameras.of(0);
+        let ray = from.r_wc * camera.ray(pixel.x, pixel.y)?;
         let x_w = self.surface.hit(&from.t_wc, &ray).ok()?.x_w;
         let on_the_way = from.retract(&(from.local(to) * PART));
-        let moved = self.camera.project(&on_the_way.to_camera(&x_w))? - pixel;
-        Some([moved.x, moved.y].map(|px| px / (PART * f64::from(self.camera.width))))
+        let moved = camera.project(&on_the_way.to_camera(&x_w))? - pixel;
+        Some([moved.x, moved.y].map(|px| px / (PART * f64::from(camera.width))))
     }
 }

@@ -21,8 +21,10 @@ use tunnelstitch_geometry::trajectory::{
 /// The frames that poses are read for.
 #[derive(Clone, Copy)]
 pub(super) struct FramesToPose<'a> {
-    /// The frames.
+    /// The frames; of a rig, those of its first camera, one a moment.
     pub frames: &'a [FrameFile],
+    /// The pictures of all cameras.
+    pub pictures: &'a [FrameFile],
     /// Frames that are left out, and whose poses may be in a file.
     pub skipped: &'a [SkippedFrame],
     /// Times of the frames, seconds, if given by a file or a video.
@@ -66,19 +68,21 @@ impl<'a> PoseReader<'a> {
     ///
     /// # Errors
     /// A malformed file; poses of a body without its mount; frames and poses that cannot be
-    /// associated; frames whose times do not increase.
+    /// associated; frames whose times do not increase. A file that has a pose for every picture of
+    /// a rig, by their number or by their names, has those of its cameras.
     pub fn read(
         &self,
         path: &Path,
         missing: MissingPoses,
     ) -> Result<InterpretedPoses, SurveyError> {
-        let file = read_poses_with(path, &self.section.file_options())?;
+        let is_rig = self.frames.pictures.len() > self.frames.frames.len();
+        let file = read_poses_with(path, &self.section.file_options(is_rig))?;
         let mut convention = Convention::of(file.format);
         convention.direction = self.section.convention.unwrap_or(convention.direction);
         convention.axes = self.section.camera_axes.unwrap_or(convention.axes);
         convention.camera_in_body = self.camera_in_body;
         convention.tunnel_in_world = self.tunnel_in_world;
-        if file.format == PoseFormat::Euroc && convention.camera_in_body.is_none() {
+        if file.format == PoseFormat::Euroc && convention.camera_in_body.is_none() && !is_rig {
             return Err(SurveyError::Association {
                 path: file.path,
                 what: "holds the poses of a body (IMU), as EuRoC's files do; say how the camera \
@@ -90,6 +94,7 @@ impl<'a> PoseReader<'a> {
         }
         let FramesToPose {
             frames,
+            pictures,
             skipped,
             times_s,
         } = self.frames;
@@ -99,7 +104,14 @@ impl<'a> PoseReader<'a> {
             _ => Associate::Order,
         };
         let (mut gaps, mut conflicts) = (Vec::new(), Vec::new());
-        let given = match self.section.associate.unwrap_or(default) {
+        let associate = self.section.associate.unwrap_or(default);
+        let of_pictures = match is_rig {
+            true => poses_of_pictures(&file, pictures, associate)?,
+            false => None,
+        };
+        let is_of_pictures = of_pictures.is_some();
+        let given = match associate {
+            Associate::Order | Associate::Name if is_of_pictures => of_pictures.unwrap_or_default(),
             Associate::Order => by_order(&file, frames, skipped, times_s)?,
             Associate::Name => {
                 let named = by_name(&file, frames, times_s)?;
@@ -114,10 +126,13 @@ impl<'a> PoseReader<'a> {
                 given
             }
         };
-        for (pair, frame) in given.windows(2).zip(frames.iter().skip(1)) {
-            if let [before, stamped] = pair
-                && stamped.time_s <= before.time_s
-            {
+        // Pictures of a moment have one time.
+        let moments = given
+            .iter()
+            .step_by(given.len().div_ceil(frames.len()).max(1));
+        let pairs = moments.clone().zip(moments.skip(1));
+        for ((before, stamped), frame) in pairs.zip(frames.iter().skip(1)) {
+            if stamped.time_s <= before.time_s {
                 return Err(SurveyError::Association {
                     path: file.path,
                     what: format!(
@@ -133,6 +148,7 @@ impl<'a> PoseReader<'a> {
         }
         let read = InterpretedPoses {
             given,
+            of_pictures: is_of_pictures,
             convention,
             format: file.format,
             gaps,
@@ -169,5 +185,21 @@ impl<'a> PoseReader<'a> {
         let given = by_time(file, frames, &times_s, how)?;
         let unit_m = self.section.unit_m.unwrap_or(1.0);
         Ok((given, frame_conflicts(file, &times_s, how, unit_m)))
+    }
+}
+
+/// The poses of all pictures of a rig, if the file has as many, or names them all.
+fn poses_of_pictures(
+    file: &PoseFile,
+    pictures: &[FrameFile],
+    associate: Associate,
+) -> Result<Option<Trajectory>, SurveyError> {
+    if file.entries.len() < pictures.len() {
+        return Ok(None);
+    }
+    match associate {
+        Associate::Order => Ok((file.entries.len() == pictures.len()).then(|| file.trajectory())),
+        Associate::Name => Ok(by_name(file, pictures, None)?.into_iter().collect()),
+        Associate::Time => Ok(None),
     }
 }

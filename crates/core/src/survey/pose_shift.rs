@@ -67,6 +67,7 @@ mod tests {
         };
         let poses = spiral(count, 0.1, 0.2).into_iter();
         InterpretedPoses {
+            of_pictures: false,
             given: poses.enumerate().map(stamped).collect(),
             convention: Convention::of(PoseFormat::Tum),
             format: PoseFormat::Tum,

@@ -107,8 +107,9 @@ impl PosesSection {
     }
 
     /// The options for reading the files. A time that is there twice is read once if poses are
-    /// associated with frames by time.
-    pub(super) fn file_options(&self) -> PoseFileOptions {
+    /// associated with frames by time; the poses of a rig's pictures share the times of their
+    /// moments.
+    pub(super) fn file_options(&self, is_rig: bool) -> PoseFileOptions {
         PoseFileOptions {
             format: self.format,
             columns: self.columns.clone(),
@@ -120,6 +121,7 @@ impl PosesSection {
             },
             duplicate_times: match self.associate {
                 Some(Associate::Time) => DuplicateTimes::Merge,
+                Some(Associate::Order | Associate::Name) | None if is_rig => DuplicateTimes::Keep,
                 Some(Associate::Order | Associate::Name) | None => DuplicateTimes::Refuse,
             },
         }

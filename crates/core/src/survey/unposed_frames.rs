@@ -11,7 +11,7 @@ use std::path::Path;
 /// The frames of a survey and their times, before poses are known.
 #[derive(Clone, Debug)]
 pub struct UnposedFrames {
-    /// The frames, sorted by name.
+    /// The frames, sorted by name; of a rig, those of its first camera, one a moment.
     pub frames: Vec<FrameFile>,
     /// Times of the frames, seconds, if given by a file, a video or all names.
     pub times_s: Option<Vec<f64>>,
@@ -29,7 +29,7 @@ impl UnposedFrames {
         let folder = folder_of(&toml_path);
         let FrameList {
             frames, times_s, ..
-        } = FrameList::new(&file.frames, &toml_path, &folder, frame_times)?;
+        } = FrameList::new(&file.frames_of(0), &toml_path, &folder, frame_times)?;
         let times_s = times_s.or_else(|| frame_times::from_names(&frames).ok());
         Ok(Self { frames, times_s })
     }

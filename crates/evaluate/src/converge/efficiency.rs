@@ -200,7 +200,7 @@ pub fn measure_efficiency(
                 let add = |squares: &mut MeanSquares, square: &Matrix6<f64>| {
                     squares.add(
                         run.survey.surface.as_ref(),
-                        &run.survey.camera,
+                        run.survey.cameras.of(k),
                         &run.truth[k],
                         square,
                     );

@@ -3,7 +3,7 @@
 use crate::error::EvaluateError;
 use crate::error::check_pairs;
 use crate::wall_error::{FrameOffsets, frame_offsets, mean_arc};
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::surface::{Surface, shortest_arc};
 use tunnelstitch_geometry::trajectory::Pose;
 use tunnelstitch_refine::{FrameFlag, FrameReport};
@@ -64,11 +64,12 @@ impl MajorityError {
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`].
 pub fn majority_error(
     surface: &dyn Surface,
-    camera: &Camera,
+    cameras: impl Into<Cameras>,
     estimated: &[Pose],
     truth: &[Pose],
 ) -> Result<MajorityError, EvaluateError> {
     check_pairs(estimated.len(), truth.len())?;
+    let cameras = cameras.into();
     // True poses are inside and look at the wall, or there would be no images. Only an estimated
     // pose can miss the wall.
     let offsets: Vec<Option<FrameOffsets>> = estimated
@@ -76,7 +77,7 @@ pub fn majority_error(
         .zip(truth)
         .enumerate()
         .map(|(frame, (estimate, truth))| {
-            frame_offsets(surface, camera, frame, estimate, truth).ok()
+            frame_offsets(surface, cameras.of(frame), frame, estimate, truth).ok()
         })
         .collect();
     let frames = AllOffsets {
@@ -179,6 +180,7 @@ impl AllOffsets<'_> {
 mod tests {
     use super::*;
     use crate::wall_error::wall_error;
+    use tunnelstitch_geometry::camera::Camera;
     use tunnelstitch_geometry::surface::{Circle, GaugeMotion};
     use tunnelstitch_geometry::trajectory::spiral;
 
@@ -198,7 +200,7 @@ mod tests {
         let mut estimated = gauge(2.9, -7.0).apply_all(&truth);
         estimated[5].t_wc.y += 1.0;
         estimated[9].t_wc.x = 5.0;
-        let error = majority_error(&circle, &camera, &estimated, &truth).unwrap();
+        let error = majority_error(&circle, camera, &estimated, &truth).unwrap();
         assert_eq!(error.good_count(), 22);
         assert!(error.frame_rms_px[4] < 1e-6, "{}", error.frame_rms_px[4]);
         let expected = camera.fx / 3.0;
@@ -206,7 +208,7 @@ mod tests {
         assert_eq!(error.frame_rms_px[9], f64::INFINITY);
         // A least-squares gauge spreads the error over all frames.
         estimated[9] = gauge(2.9, -7.0).apply(&truth[9]);
-        let wall = wall_error(&circle, &camera, &estimated, &truth).unwrap();
+        let wall = wall_error(&circle, camera, &estimated, &truth).unwrap();
         assert!(wall.frame_rms_px[4] > 5.0);
     }
 
@@ -217,7 +219,7 @@ mod tests {
         for pose in &mut estimated[13..] {
             *pose = gauge(0.1, 0.3).apply(pose);
         }
-        let error = majority_error(&circle, &camera, &estimated, &truth).unwrap();
+        let error = majority_error(&circle, camera, &estimated, &truth).unwrap();
         assert_eq!(error.good_count(), 13);
         assert!(error.frame_rms_px[..13].iter().all(|px| *px < 1e-6));
     }
@@ -230,8 +232,8 @@ mod tests {
             .enumerate()
             .map(|(k, pose)| gauge(1.0, 3.0 + 1e-4 * (k % 5) as f64).apply(pose))
             .collect();
-        let error = majority_error(&circle, &camera, &estimated, &truth).unwrap();
-        let wall = wall_error(&circle, &camera, &estimated, &truth).unwrap();
+        let error = majority_error(&circle, camera, &estimated, &truth).unwrap();
+        let wall = wall_error(&circle, camera, &estimated, &truth).unwrap();
         assert_eq!(error.good_count(), 24);
         for (ours, theirs) in error.frame_rms_px.iter().zip(&wall.frame_rms_px) {
             assert!((ours - theirs).abs() < 1e-9, "{ours} {theirs}");

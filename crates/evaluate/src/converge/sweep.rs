@@ -209,7 +209,7 @@ fn record_accuracy(
 ) -> Result<(), ConvergeError> {
     let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
     let poses = poses_of(&refined.trajectory);
-    let error = majority_error(survey.surface.as_ref(), &survey.camera, &poses, &truth)?;
+    let error = majority_error(survey.surface.as_ref(), &survey.cameras, &poses, &truth)?;
     let finite = |px: f64| px.is_finite().then_some(px);
     let is_photometric = |flag: FrameFlag| flag == FrameFlag::Photometric;
     let frames = &refined.report.frames;

@@ -19,6 +19,7 @@
 
 mod brown_conrady;
 mod calibration;
+mod cameras;
 mod colmap;
 mod double_sphere;
 mod eucm;
@@ -45,6 +46,7 @@ pub use brown_conrady::{BrownCoefficients, BrownConrady};
 pub use calibration::{
     CalibrationError, format_calibration, read_calibration, read_calibration_of, stated_readout_ms,
 };
+pub use cameras::Cameras;
 pub use colmap::{ColmapCamera, UnknownModelError};
 pub use double_sphere::DoubleSphere;
 pub use eucm::Eucm;

@@ -9,6 +9,8 @@ pub enum DuplicateTimes {
     /// They are an error: poses that are counted must all be there.
     #[default]
     Refuse,
+    /// All are kept: cameras of a rig take pictures at the same time.
+    Keep,
     /// The first of two poses is kept; if they do not agree, [`PoseConflict`] tells of it.
     Merge,
 }
@@ -62,7 +64,7 @@ impl EntryList {
                     "timestamp {time_s} after {last_s}: sort the file by time"
                 ));
             }
-            if time_s == last_s {
+            if time_s == last_s && self.duplicates != DuplicateTimes::Keep {
                 if self.duplicates == DuplicateTimes::Refuse {
                     return Err(format!(
                         "duplicate timestamp {time_s}: every pose needs a time of its own; or \
@@ -129,5 +131,10 @@ mod tests {
         list.push(1, entry(5.0, 0.0)).unwrap();
         let message = list.push(2, entry(5.0, 0.0)).unwrap_err();
         assert!(message.contains("duplicate timestamp 5"), "{message}");
+        let mut of_rig = EntryList::new(DuplicateTimes::Keep);
+        for line in 1..3 {
+            of_rig.push(line, entry(5.0, 0.0)).unwrap();
+        }
+        assert_eq!(of_rig.into_parsed().entries.len(), 2);
     }
 }

@@ -189,7 +189,15 @@ mod tests {
         let (circle, camera, grid, posed) = posed_spiral(6);
         let exclusions = Exclusions::NONE;
         let rows = -1000..1000;
-        let all = Visibility::find(&circle, &grid, &camera, None, &exclusions, &posed, &rows);
+        let all = Visibility::find(
+            &circle,
+            &grid,
+            &camera.into(),
+            None,
+            &exclusions,
+            &posed,
+            &rows,
+        );
         let mask_of = |visibility: &Visibility, block: &Range<usize>| {
             let region = region_around(&grid, &visibility.tiles[block.clone()]);
             let frames = visibility.frames(block);

@@ -247,7 +247,7 @@ mod tests {
         border.gradient = Kappa::from_fn(|k, _| number(k, 0.7));
         border.own = SharedBlock::identity() * 40.0;
         // One parameter is not free.
-        let mut calibration = Calibration::none(&Camera::from_vertical_fov(16, 16, 1.0));
+        let mut calibration = Calibration::none(Camera::from_vertical_fov(16, 16, 1.0));
         calibration.free = [true; SHARED_PARAMETERS];
         calibration.free[4] = false;
         let kappa = Kappa::from_fn(|k, _| 0.1 * number(k, 0.2));

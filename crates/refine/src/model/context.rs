@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
-use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::camera::{Cameras, Sweep};
 use tunnelstitch_geometry::surface::{Gauge, RadialField, Surface, WallRegions, bent, displaced};
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
@@ -32,8 +32,8 @@ pub struct EstimationContext<'a> {
     pub surface: Arc<dyn Surface>,
     /// Parts of the wall where frames are not compared.
     pub ignored: &'a WallRegions,
-    /// The camera at full size at the current κ, without motion during the readout.
-    pub camera: Camera,
+    /// The cameras at full size at the current κ, without motion during the readout.
+    pub cameras: Cameras,
     /// Timing of the readout of the frames' rows.
     pub shutter: &'a Shutter,
     /// The shared parameters: which are estimated, and their prior.
@@ -53,12 +53,12 @@ pub struct EstimationContext<'a> {
 }
 
 impl EstimationContext<'_> {
-    /// Replaces the shared parameters, the camera and the wall; no change if `kappa` gives no valid
-    /// camera.
+    /// Replaces the shared parameters, the cameras and the wall; no change if `kappa` gives no
+    /// valid camera.
     pub fn at(&self, kappa: Kappa) -> Self {
-        match self.calibration.camera(&kappa) {
-            Some(camera) => Self {
-                camera,
+        match self.calibration.cameras(&kappa) {
+            Some(cameras) => Self {
+                cameras,
                 kappa,
                 nominal: self.nominal_at(&kappa),
                 surface: self.surface_at(&kappa, self.shape.as_deref()),

@@ -11,6 +11,9 @@ use tunnelstitch_geometry::trajectory::{Pose, so3};
 /// Derivative of an error by the datum parameters `(ln r, τ_x, τ_z, o_x, o_z)`.
 pub type DatumJacobian = SMatrix<f64, 6, DATUM_PARAMETERS>;
 
+/// An error of two poses, and its derivatives by the steps of the earlier and the later one.
+pub type RelativeError = (Vector6<f64>, Matrix6<f64>, Matrix6<f64>);
+
 /// Error of a pose around its initial value, `e = (Log(R̂ᵀR), scale · t − t̂)`, and its derivative
 /// by the pose's step.
 pub fn absolute_error(initial: &Pose, pose: &Pose, scale: f64) -> (Vector6<f64>, Matrix6<f64>) {
@@ -66,7 +69,7 @@ pub fn relative_error(
     before: &Pose,
     pose: &Pose,
     scale: f64,
-) -> (Vector6<f64>, Matrix6<f64>, Matrix6<f64>) {
+) -> RelativeError {
     let initial_rotation = initial_before.r_wc.inverse() * initial.r_wc;
     let rotation = before.r_wc.inverse() * pose.r_wc;
     let omega = so3::log(&(initial_rotation.inverse() * rotation));
@@ -93,6 +96,55 @@ pub fn relative_error_by_datum(
         &(initial.t_wc - initial_before.t_wc),
         &(pose.t_wc - before.t_wc),
     )
+}
+
+/// The pose of another camera of a rig by the pose of one and the `relation` of both
+/// ([`tunnelstitch_geometry::trajectory::Rig::relation`], metres), and its derivative by a step of
+/// the one; positions of poses are metres over `scale`.
+///
+/// `R = R_a M_R`, `t = t_a + R_a M_t / scale`.
+pub fn transferred(pose: &Pose, relation: &Pose, scale: f64) -> (Pose, Matrix6<f64>) {
+    let m_t = relation.t_wc / scale;
+    let mut j = Matrix6::identity();
+    let m_r = relation.r_wc.to_rotation_matrix();
+    j.fixed_view_mut::<3, 3>(0, 0)
+        .copy_from(&m_r.matrix().transpose());
+    j.fixed_view_mut::<3, 3>(3, 0)
+        .copy_from(&(-(pose.r_wc.to_rotation_matrix().matrix() * so3::skew(&m_t))));
+    (pose.after(&Pose::new(relation.r_wc, m_t)), j)
+}
+
+/// Error of the place of a camera `b` of a rig relative to another one, `a`, around their
+/// `relation` M, metres, and its derivatives by the steps of `a` and `b`.
+///
+/// `e = (Log(M_Rᵀ R_aᵀ R_b), scale · R_aᵀ (t_b − t_a) − M_t)`. It is the same wherever the rig is
+/// and however it is turned.
+pub fn relation_error(relation: &Pose, a: &Pose, b: &Pose, scale: f64) -> RelativeError {
+    let rotation = a.r_wc.inverse() * b.r_wc;
+    let omega = so3::log(&(relation.r_wc.inverse() * rotation));
+    let place = scale * a.r_wc.inverse_transform_vector(&(b.t_wc - a.t_wc));
+    let rho = place - relation.t_wc;
+    let e = Vector6::new(omega.x, omega.y, omega.z, rho.x, rho.y, rho.z);
+    let right = so3::right_jacobian_inverse(&omega);
+    let r_aw = scale * a.r_wc.inverse().to_rotation_matrix().matrix();
+    let (mut j_a, mut j_b) = (Matrix6::zeros(), Matrix6::zeros());
+    j_a.fixed_view_mut::<3, 3>(0, 0)
+        .copy_from(&(-right * rotation.inverse().to_rotation_matrix().matrix()));
+    j_a.fixed_view_mut::<3, 3>(3, 0)
+        .copy_from(&so3::skew(&place));
+    j_a.fixed_view_mut::<3, 3>(3, 3).copy_from(&-r_aw);
+    j_b.fixed_view_mut::<3, 3>(0, 0).copy_from(&right);
+    j_b.fixed_view_mut::<3, 3>(3, 3).copy_from(&r_aw);
+    (e, j_a, j_b)
+}
+
+/// Derivative of [`relation_error`] by the datum: the relation is of the rig, whatever the frame of
+/// the initial poses.
+pub fn relation_error_by_datum(datum: &Datum, (a, b): (&Pose, &Pose)) -> DatumJacobian {
+    let place = datum.scale * a.r_wc.inverse_transform_vector(&(b.t_wc - a.t_wc));
+    let mut j = DatumJacobian::zeros();
+    j.fixed_view_mut::<3, 1>(3, 0).copy_from(&place);
+    j
 }
 
 #[cfg(test)]
@@ -132,7 +184,7 @@ pub mod tests {
     pub fn calibration() -> Calibration {
         Calibration {
             middle_h_m: 0.4,
-            ..Calibration::none(&Camera::from_vertical_fov(16, 16, 1.0))
+            ..Calibration::none(Camera::from_vertical_fov(16, 16, 1.0))
         }
     }
 
@@ -146,6 +198,21 @@ pub mod tests {
         assert!((numeric(|xi| relative_error(&a, &b, &c, &d.retract(xi), s).0) - j).norm() < 1e-7);
         let expected = numeric(|xi| relative_error(&a, &b, &c.retract(xi), &d, s).0);
         assert!((expected - j_before).norm() < 1e-7);
+        let (_, j_a, j_b) = relation_error(&a, &c, &d, s);
+        let expected = numeric(|xi| relation_error(&a, &c.retract(xi), &d, s).0);
+        assert!((expected - j_a).norm() < 1e-7);
+        assert!((numeric(|xi| relation_error(&a, &c, &d.retract(xi), s).0) - j_b).norm() < 1e-7);
+        let (moved, j) = transferred(&c, &a, s);
+        let expected = numeric(|xi| moved.local(&transferred(&c.retract(xi), &a, s).0));
+        assert!((expected - j).norm() < 1e-7);
+    }
+
+    /// A rig that turns carries its cameras along.
+    #[test]
+    fn a_relation_has_no_error_however_the_rig_is_turned() {
+        let (relation, rig) = (pose(0.7), pose(0.3));
+        let other = transferred(&rig, &relation, 1.1).0;
+        assert!(relation_error(&relation, &rig, &other, 1.1).0.norm() < 1e-12);
     }
 
     #[test]

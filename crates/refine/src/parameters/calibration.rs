@@ -35,7 +35,7 @@
 
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 use tunnelstitch_core::survey::{CalibrateSection, CalibrationGroup};
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::{Camera, Cameras};
 use tunnelstitch_geometry::surface::{Bend, GaugeMotion};
 use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose, so3};
 
@@ -68,10 +68,10 @@ pub const PIXEL_INDICES: [usize; PIXEL_PARAMETERS] =
 pub type Kappa = SVector<f64, SHARED_PARAMETERS>;
 
 /// The choice of estimated shared parameters, with their given values and prior.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Calibration {
-    /// The camera as given.
-    pub given: Camera,
+    /// The cameras as given.
+    pub given: Cameras,
     /// Given time from reading a frame's first row to reading its last, seconds.
     pub readout_s: f64,
     /// Prior 1-σ of κ.
@@ -87,9 +87,9 @@ pub struct Calibration {
 
 impl Calibration {
     /// No shared parameter estimated.
-    pub fn none(camera: &Camera) -> Self {
+    pub fn none(cameras: impl Into<Cameras>) -> Self {
         Self {
-            given: *camera,
+            given: cameras.into(),
             readout_s: 0.0,
             sigma: Kappa::repeat(1.0),
             free: [false; SHARED_PARAMETERS],
@@ -102,11 +102,11 @@ impl Calibration {
     pub fn new(
         groups: &[CalibrationGroup],
         section: &CalibrateSection,
-        camera: &Camera,
+        cameras: &Cameras,
         initial: &[Pose],
     ) -> Self {
         use CalibrationGroup::{Axis, Centre, Distortion, Focal, Radius};
-        let centre_px = 0.01 * section.centre_sigma_percent * f64::from(camera.width);
+        let centre_px = 0.01 * section.centre_sigma_percent * f64::from(cameras.size()[0]);
         let tilt_rad = section.axis_tilt_sigma_deg.to_radians();
         let offset_m = section.axis_offset_sigma_m;
         let parameters = [
@@ -123,14 +123,14 @@ impl Calibration {
         ];
         let sum: f64 = initial.iter().map(|pose| pose.t_wc.y).sum();
         Self {
-            given: *camera,
+            given: cameras.clone(),
             readout_s: 0.0,
             sigma: Kappa::from_fn(|k, _| parameters.get(k).map_or(1.0, |(_, sigma)| *sigma)),
             free: std::array::from_fn(|k| {
                 parameters
                     .get(k)
                     .is_some_and(|(group, _)| groups.contains(group))
-                    && lens_has_parameter(camera, k)
+                    && (k >= INTRINSIC_PARAMETERS || has_intrinsic(cameras, k))
             }),
             tested: [false; SHARED_PARAMETERS],
             middle_h_m: sum / initial.len().max(1) as f64,
@@ -173,9 +173,10 @@ impl Calibration {
         self.free.contains(&true)
     }
 
-    /// True if the camera's model has the intrinsic parameter `k`.
+    /// True if `k` is an intrinsic parameter that can be estimated: one of a single camera, whose
+    /// model has it.
     pub fn has_intrinsic(&self, k: usize) -> bool {
-        k < INTRINSIC_PARAMETERS && lens_has_parameter(&self.given, k)
+        k < INTRINSIC_PARAMETERS && has_intrinsic(&self.given, k)
     }
 
     /// True if the equations of a parameter are kept.
@@ -183,9 +184,18 @@ impl Calibration {
         self.free[k] || self.tested[k]
     }
 
-    /// The camera at κ; None if its distortion is not invertible over the image.
-    pub fn camera(&self, kappa: &Kappa) -> Option<Camera> {
-        let mut camera = self.given;
+    /// The cameras at κ; None if a distortion is not invertible over the image. Those of a rig are
+    /// as given: κ has the intrinsics of one camera.
+    pub fn cameras(&self, kappa: &Kappa) -> Option<Cameras> {
+        match self.given.all() {
+            [camera] => Some(Self::camera(camera, kappa)?.into()),
+            _ => Some(self.given.clone()),
+        }
+    }
+
+    /// A camera at κ; None if its distortion is not invertible over the image.
+    fn camera(given: &Camera, kappa: &Kappa) -> Option<Camera> {
+        let mut camera = *given;
         camera.fx *= kappa[FOCAL_INDEX].exp();
         camera.fy *= kappa[FOCAL_INDEX].exp();
         camera.cx += kappa[1];
@@ -193,8 +203,8 @@ impl Calibration {
         let [k1, k2] = camera.lens.k1_k2();
         camera.lens = camera.lens.with_k1_k2(k1 + kappa[3], k2 + kappa[4]);
         // The test is needed only if the distortion changes.
-        let is_invertible = camera.lens == self.given.lens
-            || camera.visible_fraction() >= self.given.visible_fraction();
+        let is_invertible =
+            camera.lens == given.lens || camera.visible_fraction() >= given.visible_fraction();
         is_invertible.then_some(camera)
     }
 
@@ -250,9 +260,9 @@ impl Calibration {
     }
 }
 
-/// True unless the parameter is k1 or k2 and the lens has none.
-fn lens_has_parameter(camera: &Camera, k: usize) -> bool {
-    !DISTORTION_INDICES.contains(&k) || camera.lens.has_k1_k2()
+/// True if it is a single camera that has the parameter: unless it is k1 or k2 of a lens without.
+fn has_intrinsic(cameras: &Cameras, k: usize) -> bool {
+    !cameras.is_rig() && (!DISTORTION_INDICES.contains(&k) || cameras.of(0).lens.has_k1_k2())
 }
 
 /// The similarity transform from the initial poses' frame to the tunnel.
@@ -338,7 +348,7 @@ mod tests {
     fn calibration() -> Calibration {
         Calibration {
             middle_h_m: 4.0,
-            ..Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0))
+            ..Calibration::none(Camera::from_vertical_fov(160, 120, 1.0))
         }
     }
 
@@ -346,7 +356,7 @@ mod tests {
     fn zero_parameters_change_nothing_to_the_last_bit() {
         let calibration = calibration();
         let zero = Kappa::zeros();
-        assert_eq!(calibration.camera(&zero), Some(calibration.given));
+        assert_eq!(calibration.cameras(&zero), Some(calibration.given.clone()));
         let pose = Pose::new(
             so3::exp(&Vector3::new(0.3, -0.8, 0.1)),
             Vector3::new(0.123, 4.567, -0.891),
@@ -399,10 +409,10 @@ mod tests {
                 ..Camera::from_vertical_fov(160, 120, 1.0)
             };
             let section = CalibrateSection::default();
-            let calibration = Calibration::new(&groups, &section, &camera, &[]);
+            let calibration = Calibration::new(&groups, &section, &camera.into(), &[]);
             let mut kappa = Kappa::zeros();
             (kappa[0], kappa[3]) = (0.01, 0.1);
-            let moved = calibration.camera(&kappa).unwrap();
+            let moved = *calibration.cameras(&kappa).unwrap().of(0);
             assert_eq!(moved.lens == lens, !lens.has_k1_k2());
             assert!((moved.fx / camera.fx - 0.01f64.exp()).abs() < 1e-12);
             calibration.free
@@ -420,6 +430,6 @@ mod tests {
     fn a_non_invertible_distortion_gives_no_camera() {
         let mut kappa = Kappa::zeros();
         kappa[3] = -2.0;
-        assert!(calibration().camera(&kappa).is_none());
+        assert!(calibration().cameras(&kappa).is_none());
     }
 }

@@ -10,7 +10,7 @@ use crate::parameters::unknowns::Unknowns;
 use crate::problem::block_sums::BlockSums;
 use crate::problem::linearisation::{FrameContribution, Linearisation};
 use crate::problem::photometric_problem::PhotometricProblem;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Gauge;
 
@@ -36,7 +36,7 @@ impl PhotometricProblem<'_> {
     /// Cost and normal equations at the given unknowns.
     ///
     /// The cost is infinite if κ gives no valid camera
-    /// ([`crate::parameters::calibration::Calibration::camera`]). All sums run in the same
+    /// ([`crate::parameters::calibration::Calibration::cameras`]). All sums run in the same
     /// order, whatever the number of threads.
     ///
     /// # Errors
@@ -44,12 +44,12 @@ impl PhotometricProblem<'_> {
     pub fn linearise_at(&self, unknowns: &Unknowns) -> Result<Linearisation, ProblemError> {
         let kappa = &unknowns.kappa;
         let mut sums = self.zero_linearisation();
-        let calibration = self.context.calibration;
-        let Some(camera) = calibration.camera(kappa) else {
+        let calibration = &self.context.calibration;
+        let Some(cameras) = calibration.cameras(kappa) else {
             sums.cost = f64::INFINITY;
             return Ok(sums);
         };
-        self.add_pixels(unknowns, &camera, &mut sums)?;
+        self.add_pixels(unknowns, &cameras, &mut sums)?;
         self.scale_by_noise(&mut sums);
         sums.cost += self.add_prior(unknowns, &mut sums.normal, sums.border.as_mut());
         sums.cost += self.add_points(&unknowns.shape, &mut sums.normal);
@@ -57,7 +57,7 @@ impl PhotometricProblem<'_> {
             sums.cost +=
                 calibration.prior_cost(kappa) - self.log_volume_slope() * kappa[RADIUS_INDEX];
             border.gradient[RADIUS_INDEX] -= self.log_volume_slope();
-            border.apply_prior(&calibration, kappa);
+            border.apply_prior(calibration, kappa);
         }
         if self.held_frame_count() == 0 {
             let slot = self.gauge_slot.unwrap_or(0);
@@ -86,10 +86,10 @@ impl PhotometricProblem<'_> {
     fn add_pixels(
         &self,
         unknowns: &Unknowns,
-        camera: &Camera,
+        cameras: &Cameras,
         sums: &mut Linearisation,
     ) -> Result<(), ProblemError> {
-        self.visit_blocks(unknowns, camera, &mut |_, block| {
+        self.visit_blocks(unknowns, cameras, &mut |_, block| {
             sums.cost += block.cost;
             block.add_to(
                 &self.pattern,
@@ -113,7 +113,7 @@ impl PhotometricProblem<'_> {
     pub(super) fn visit_blocks(
         &self,
         unknowns: &Unknowns,
-        camera: &Camera,
+        cameras: &Cameras,
         visit: &mut dyn FnMut((i64, i64), &BlockSums),
     ) -> Result<(), ProblemError> {
         let estimates = &self.with_active(&unknowns.frames);
@@ -122,17 +122,17 @@ impl PhotometricProblem<'_> {
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch);
             let pyramids = self.images.load(self.coverage.frames(stretch))?;
-            let at_level = camera.at_level(self.sampling.level);
+            let at_level = cameras.at_level(self.sampling.level);
             let sampled_frames = self.sampled_frames(
                 stretch,
                 &pyramids,
                 estimates,
-                at_level,
+                &at_level,
                 (surface.as_ref(), readout_s),
             );
             for batch in visibility.blocks.chunks(BATCH) {
                 let blocks: Vec<BlockSums> = batch.par_map(|block| {
-                    let wall = (surface.as_ref(), camera);
+                    let wall = (surface.as_ref(), cameras);
                     self.sum_block(stretch, &visibility, block, &sampled_frames, wall)
                 });
                 for (tiles, block) in batch.iter().zip(&blocks) {

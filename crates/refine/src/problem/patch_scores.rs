@@ -70,9 +70,9 @@ impl PhotometricProblem<'_> {
     /// # Errors
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
     pub fn patch_scores(&self, unknowns: &Unknowns) -> Result<PatchScores, ProblemError> {
-        let calibration = self.context.calibration;
+        let calibration = &self.context.calibration;
         let mut scores = PatchScores::default();
-        let Some(camera) = calibration.camera(&unknowns.kappa) else {
+        let Some(cameras) = calibration.cameras(&unknowns.kappa) else {
             return Ok(scores);
         };
         let information = self.information();
@@ -83,7 +83,7 @@ impl PhotometricProblem<'_> {
                 0.0
             }
         });
-        self.visit_blocks(unknowns, &camera, &mut |(row, column), block| {
+        self.visit_blocks(unknowns, &cameras, &mut |(row, column), block| {
             let gradient: Vec<FrameStep> = block.gradient.iter().map(|g| g * information).collect();
             let shared = block.intrinsics.as_ref().map(|sums| sums.shared_gradient());
             let shared = shared.unwrap_or_else(Kappa::zeros).component_mul(&free);

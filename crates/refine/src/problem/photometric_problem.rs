@@ -25,7 +25,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::Pyramid;
 use tunnelstitch_core::survey::MaskedWall;
-use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::camera::{Camera, Cameras, Sweep};
 use tunnelstitch_geometry::surface::Surface;
 
 /// The objective ([`crate::tiles::tile`]) for a window of frames on a fixed set of wall
@@ -45,8 +45,8 @@ pub struct PhotometricProblem<'a> {
     pub(super) sampling: Sampling,
     /// Images of the participants.
     pub(super) images: FrameImages<'a>,
-    /// The camera at the pyramid level.
-    pub(super) camera: Camera,
+    /// The cameras at the pyramid level.
+    pub(super) cameras: Cameras,
     /// Lattice of the samples.
     pub(super) grid: WallGrid,
     /// Frames that are sampled.
@@ -105,10 +105,10 @@ impl<'a> PhotometricProblem<'a> {
         window: FrameWindow,
     ) -> Result<Self, ProblemError> {
         let Sampling { level, density, .. } = sampling;
-        let camera = context.camera.at_level(level);
+        let cameras = context.cameras.at_level(level);
         let rate = |frame| context.sweep_rate(frame, &window.participants, window.estimates);
         let rates: Vec<Sweep> = window.participants.clone().map(rate).collect();
-        let posed = pose_frames(context, &camera, &window, &rates)?;
+        let posed = pose_frames(context, &cameras, &window, &rates)?;
         let FrameWindow {
             participants,
             active,
@@ -119,9 +119,10 @@ impl<'a> PhotometricProblem<'a> {
         let gauge_slot = active
             .clone()
             .position(|frame| compared[frame - participants.start]);
-        let poses = posed.iter().flatten().map(|frame| &frame.pose);
-        let pixel_size_m = pixel_size_on_wall(context.surface.as_ref(), &camera, poses);
-        let density = density.max(min_density(camera.height));
+        let poses = posed.iter().flatten();
+        let poses = poses.map(|frame| (frame.index, &frame.pose));
+        let pixel_size_m = pixel_size_on_wall(context.surface.as_ref(), &cameras, poses);
+        let density = density.max(min_density(cameras.size()[1]));
         let grid = WallGrid::new(context.surface.as_ref(), pixel_size_m, density);
         let images = FrameImages {
             frames: context.frames,
@@ -129,12 +130,12 @@ impl<'a> PhotometricProblem<'a> {
         };
         let exclusions = Exclusions {
             ignored: context.ignored,
-            mask: context.frames.mask(&camera),
+            masks: context.frames.masks(),
         };
         let coverage = TileCoverage::new(
             Arc::clone(&context.surface),
             grid,
-            camera,
+            cameras.clone(),
             images,
             exclusions,
             posed,
@@ -156,7 +157,7 @@ impl<'a> PhotometricProblem<'a> {
             context: context.clone(),
             sampling,
             images,
-            camera,
+            cameras,
             grid,
             estimates: estimates.to_vec(),
             rates,
@@ -351,17 +352,18 @@ impl<'a> PhotometricProblem<'a> {
     pub fn camera_of(&self, participant: usize) -> Camera {
         let readout_s = self.context.calibration.readout_s(&self.context.kappa);
         let sweep = self.rates[participant].scaled(readout_s);
-        self.context.camera.with_sweep(&sweep)
+        let frame = self.participants.start + participant;
+        self.context.cameras.of(frame).with_sweep(&sweep)
     }
 
-    /// The frames of a stretch at the given estimates of all participants, taken by `camera` (of
+    /// The frames of a stretch at the given estimates of all participants, taken by `cameras` (of
     /// the level) with a readout of `readout_s` seconds, along the wall `surface`.
     pub(super) fn sampled_frames<'s>(
         &self,
         stretch: usize,
         pyramids: &'s [Arc<Pyramid>],
         estimates: &[FrameEstimate],
-        camera: Camera,
+        cameras: &Cameras,
         (surface, readout_s): (&dyn Surface, f64),
     ) -> Vec<SampledFrame<'s>> {
         let frames = self.coverage.frames(stretch).iter();
@@ -371,7 +373,9 @@ impl<'a> PhotometricProblem<'a> {
             .map(|(k, pyramid)| {
                 let frame = SampledFrame::new(
                     pyramid.level(self.sampling.level),
-                    camera.with_sweep(&self.rates[*k].scaled(readout_s)),
+                    cameras
+                        .of(self.participants.start + *k)
+                        .with_sweep(&self.rates[*k].scaled(readout_s)),
                     &estimates[*k],
                 )
                 .with_interpolation(self.sampling.interpolation);
@@ -391,7 +395,7 @@ impl<'a> PhotometricProblem<'a> {
     ) -> Vec<SampledFrame<'s>> {
         let readout_s = self.context.calibration.readout_s(&self.context.kappa);
         let wall = (self.context.surface.as_ref(), readout_s);
-        self.sampled_frames(stretch, pyramids, &self.estimates, self.camera, wall)
+        self.sampled_frames(stretch, pyramids, &self.estimates, &self.cameras, wall)
     }
 
     /// Estimates of all participants, with those of the active frames replaced.

@@ -11,7 +11,7 @@ use crate::samples::visibility::PosedFrame;
 use crate::tiles::grid::{SIDE, WallGrid};
 use std::collections::HashSet;
 use std::ops::Range;
-use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::camera::{Cameras, Sweep};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{Surface, mean_radius_m, viewing_distance};
 use tunnelstitch_geometry::trajectory::Pose;
@@ -27,7 +27,7 @@ const MIN_SAMPLES_PER_IMAGE_HEIGHT: usize = 9 * SIDE;
 /// [`ProblemError::Placement`].
 pub fn pose_frames(
     context: &EstimationContext,
-    camera: &Camera,
+    cameras: &Cameras,
     window: &FrameWindow,
     rates: &[Sweep],
 ) -> Result<Vec<Option<PosedFrame>>, ProblemError> {
@@ -39,11 +39,12 @@ pub fn pose_frames(
         let frame = window.participants.start + k;
         let pose = window.estimates[k].pose;
         let sweep = rates[k].scaled(readout_s);
+        let camera = cameras.of(frame).with_sweep(&sweep);
         Ok(Some(PosedFrame {
             index: frame,
             pose,
             sweep,
-            footprint: footprint(context, &camera.with_sweep(&sweep), frame, &pose)?,
+            footprint: footprint(context, &camera, frame, &pose)?,
             active: window.active.contains(&frame),
         }))
     });
@@ -109,16 +110,20 @@ pub fn min_density(rows: u32) -> f64 {
         .max(1.0)
 }
 
-/// Width of a pixel on the wall where the median frame sees it best, metres.
+/// Width of a pixel on the wall where the median frame sees it best, metres; `poses`: of frames.
 pub fn pixel_size_on_wall<'p>(
     surface: &dyn Surface,
-    camera: &Camera,
-    poses: impl Iterator<Item = &'p Pose>,
+    cameras: &Cameras,
+    poses: impl Iterator<Item = (usize, &'p Pose)>,
 ) -> f64 {
-    let mut ranges: Vec<f64> = poses
-        .filter_map(|pose| viewing_distance(surface, camera, pose).ok())
+    let mut sizes: Vec<f64> = poses
+        .filter_map(|(frame, pose)| {
+            let camera = cameras.of(frame);
+            let range_m = viewing_distance(surface, camera, pose).ok()?;
+            Some(range_m / camera.vertical_focal_px())
+        })
         .collect();
-    ranges.sort_unstable_by(f64::total_cmp);
-    let median = ranges.get(ranges.len() / 2);
-    median.copied().unwrap_or_else(|| mean_radius_m(surface)) / camera.vertical_focal_px()
+    sizes.sort_unstable_by(f64::total_cmp);
+    let at_wall = || mean_radius_m(surface) / cameras.of(0).vertical_focal_px();
+    sizes.get(sizes.len() / 2).copied().unwrap_or_else(at_wall)
 }

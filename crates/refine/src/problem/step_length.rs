@@ -30,33 +30,41 @@ impl PhotometricProblem<'_> {
         step: &[FrameStep],
         shared: &Kappa,
     ) -> Vec<f64> {
-        active
-            .iter()
-            .zip(step)
-            .map(|(estimate, step)| self.frame_step_px(estimate, step, shared) * self.pixel_px())
+        let frames = self.active.clone().zip(active.iter().zip(step));
+        frames
+            .map(|(k, (estimate, step))| {
+                self.frame_step_px((k, estimate), step, shared) * self.pixel_px()
+            })
             .collect()
     }
 
     /// Motion of the wall in one frame's image, in pixels of the level.
-    fn frame_step_px(&self, estimate: &FrameEstimate, step: &FrameStep, shared: &Kappa) -> f64 {
+    fn frame_step_px(
+        &self,
+        (frame, estimate): (usize, &FrameEstimate),
+        step: &FrameStep,
+        shared: &Kappa,
+    ) -> f64 {
+        let camera = self.cameras.of(frame);
         let xi: nalgebra::Vector6<f64> = step.fixed_rows::<6>(0).into();
         let pose = &estimate.pose;
         let straightened = self.context.surface.straightened(pose);
         let intrinsics = shared.fixed_rows::<INTRINSIC_PARAMETERS>(0);
         let curvature = shared.fixed_rows::<BEND_PARAMETERS>(BEND_INDEX);
-        (self.camera.corner_and_centre_rays().into_iter())
+        (camera.corner_and_centre_rays().into_iter())
             .filter_map(|ray_c| {
                 let surface = self.context.surface.as_ref();
-                let hit = sighted_wall(surface, &self.camera, pose, &ray_c).ok()?;
+                let hit = sighted_wall(surface, camera, pose, &ray_c).ok()?;
                 let wall = self.context.surface.frame(hit.wall);
                 let a = wall_jacobian(pose, &wall);
                 let mut motion = a * xi;
                 if self.estimates_shared {
                     let x_c = ray_c * hit.range;
-                    motion += lens_jacobian(pose, &a, &self.context.camera, &x_c) * intrinsics
+                    motion += lens_jacobian(pose, &a, self.context.cameras.of(frame), &x_c)
+                        * intrinsics
                         + bend_jacobian(pose, &straightened, &a, &x_c) * curvature;
                 }
-                Some(motion.norm() * self.camera.vertical_focal_px() / hit.range)
+                Some(motion.norm() * camera.vertical_focal_px() / hit.range)
             })
             .fold(0.0, f64::max)
     }

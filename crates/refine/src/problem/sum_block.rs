@@ -16,7 +16,7 @@ use crate::tiles::workspace::TileWorkspace;
 use nalgebra::Matrix2x6;
 use std::ops::Range;
 use std::sync::Arc;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_geometry::surface::Surface;
 
@@ -32,8 +32,8 @@ struct BlockContext<'b> {
     slots: Vec<Option<usize>>,
     /// The wall.
     surface: &'b dyn Surface,
-    /// The camera at full size.
-    camera: &'b Camera,
+    /// The cameras at full size.
+    cameras: &'b Cameras,
 }
 
 impl PhotometricProblem<'_> {
@@ -44,7 +44,7 @@ impl PhotometricProblem<'_> {
         visibility: &Visibility,
         block: &Range<usize>,
         sampled_frames: &[SampledFrame],
-        (surface, camera): (&dyn Surface, &Camera),
+        (surface, cameras): (&dyn Surface, &Cameras),
     ) -> BlockSums {
         let participants = self.coverage.frames(stretch);
         let context = BlockContext {
@@ -53,7 +53,7 @@ impl PhotometricProblem<'_> {
             participants,
             slots: participants.iter().map(|k| self.slot(*k)).collect(),
             surface,
-            camera,
+            cameras,
         };
         let frames = visibility.frames(block).into_iter();
         let mut slots: Vec<usize> = frames.filter_map(|k| context.slots[k]).collect();
@@ -203,7 +203,8 @@ impl PhotometricProblem<'_> {
         if self.estimates_shared {
             let frame = &context.sampled_frames[observer.frame as usize];
             let participant = context.participants[observer.frame as usize];
-            frame.shared_jacobian(points, a, context.camera, &self.rates[participant])
+            let camera = context.cameras.of(self.participants.start + participant);
+            frame.shared_jacobian(points, a, camera, &self.rates[participant])
         } else {
             SharedJacobian::zeros()
         }

@@ -56,7 +56,7 @@ impl Ring {
             calibration: Calibration {
                 free: [true; SHARED_PARAMETERS],
                 sigma: Kappa::repeat(1.0),
-                ..Calibration::none(&wall.camera)
+                ..Calibration::none(wall.camera)
             },
             wall,
             frames: FrameCache::of_pyramids(frames),
@@ -109,7 +109,7 @@ impl Ring {
     ) -> PhotometricProblem<'_> {
         let context = EstimationContext {
             shape,
-            calibration: self.calibration,
+            calibration: self.calibration.clone(),
             ..test_context(&self.wall, &self.frames, &self.prior)
         };
         let all = 0..self.estimates.len();

@@ -33,7 +33,7 @@ impl<'s> PicturePairs<'s> {
     pub fn load(survey: &'s Survey, firsts: &[usize]) -> Result<Self, RefineError> {
         let frames = frames_of(firsts);
         let chosen = survey.frames.only(&frames);
-        let (width, height) = (survey.camera.width, survey.camera.height);
+        let [width, height] = survey.cameras.size();
         let files: Vec<_> = chosen.iter().collect();
         let pictures = files.par_map(|file| load_colour(file, width, height));
         let pictures: Result<Vec<_>, _> = pictures.into_iter().collect();
@@ -58,7 +58,7 @@ impl<'s> PicturePairs<'s> {
         let wanted = frames_of(firsts);
         let turned = |k: &usize| reading.orientation.turned(&self.pictures[k]);
         let mut frames = FrameSet::in_memory(wanted.iter().map(turned));
-        if let Some(mask) = self.survey.frames.mask() {
+        if let Some(mask) = self.survey.frames.masks().of(0) {
             frames.hide(mask);
         }
         let initial: Vec<StampedPose> = wanted.iter().map(|k| reading.initial[*k]).collect();
@@ -68,7 +68,7 @@ impl<'s> PicturePairs<'s> {
             ..RefineOptions::fast()
         };
         let input = RefineInput {
-            camera: reading.camera(&self.survey.camera),
+            cameras: reading.camera(self.survey.cameras.of(0)).into(),
             frames: &frames,
             initial: &initial,
             pose_gaps: &[],

@@ -42,7 +42,7 @@ struct Found<'r> {
 }
 
 /// Looks for readings that neighbouring frames agree with; None if they do with the one given, or
-/// with no other.
+/// with no other, or if they are of a rig.
 ///
 /// A frame is registered on the wall that the one before it shows, as tracking does, from the
 /// reading's pose and within its prior. Where it is found in both readings, the evidence against
@@ -58,6 +58,9 @@ struct Found<'r> {
 /// # Errors
 /// [`ReadingSearchError`].
 pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, ReadingSearchError> {
+    if survey.cameras.is_rig() {
+        return Ok(None);
+    }
     let readings = survey.pose_readings()?;
     let least_nats = (readings.len() as f64 / RefineOptions::default().false_alarm_rate).ln();
     let Some((given, others)) = readings.split_first() else {

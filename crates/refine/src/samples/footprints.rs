@@ -50,7 +50,7 @@ pub fn footprints(
     frames: &FrameStates,
 ) -> Result<Vec<Footprint>, ProblemError> {
     let footprints = (0..frames.estimates.len()).par_map(|k| {
-        let camera = context.camera.with_sweep(&frames.sweep(context, k));
+        let camera = context.cameras.of(k).with_sweep(&frames.sweep(context, k));
         footprint(context, &camera, k, &frames.estimates[k].pose)
     });
     footprints.into_iter().collect()

@@ -264,7 +264,7 @@ mod tests {
         let visibility = Visibility::find(
             &wall.circle,
             &grid,
-            &camera,
+            &camera.into(),
             None,
             &Exclusions::NONE,
             &posed,

@@ -11,7 +11,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::{FrameCache, FrameError, Pyramid};
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
 
@@ -55,8 +55,8 @@ impl FrameImages<'_> {
 pub struct TileCoverage<'a> {
     surface: Arc<dyn Surface>,
     grid: WallGrid,
-    /// The camera at the pyramid level.
-    camera: Camera,
+    /// The cameras at the pyramid level.
+    cameras: Cameras,
     images: FrameImages<'a>,
     exclusions: Exclusions<'a>,
     /// Poses of the participants at which the tiles are selected; None for those that are not
@@ -79,7 +79,7 @@ impl<'a> TileCoverage<'a> {
     pub fn new(
         surface: Arc<dyn Surface>,
         grid: WallGrid,
-        camera: Camera,
+        cameras: Cameras,
         images: FrameImages<'a>,
         exclusions: Exclusions<'a>,
         posed: Vec<Option<PosedFrame>>,
@@ -88,7 +88,7 @@ impl<'a> TileCoverage<'a> {
             stretches: divide_into_stretches(&grid, &posed, images.frames.pyramid_capacity()),
             surface,
             grid,
-            camera,
+            cameras,
             images,
             exclusions,
             posed,
@@ -159,7 +159,7 @@ impl<'a> TileCoverage<'a> {
         Visibility::find(
             self.surface.as_ref(),
             &self.grid,
-            &self.camera,
+            &self.cameras,
             self.images.frames.camera_light().as_deref(),
             &self.exclusions,
             &posed,

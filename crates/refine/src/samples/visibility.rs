@@ -8,8 +8,9 @@ use crate::thresholds::visibility::MIN_RELATIVE_SHARPNESS;
 use crate::tiles::grid::{TileId, WallGrid};
 use std::collections::HashSet;
 use std::ops::Range;
-use tunnelstitch_core::frames::{CameraLight, PyramidMask};
-use tunnelstitch_geometry::camera::{Camera, Sweep};
+use std::sync::Arc;
+use tunnelstitch_core::frames::{CameraLight, Masks, PyramidMask};
+use tunnelstitch_geometry::camera::{Cameras, Sweep};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{Footprint, Surface, WallRegions};
 use tunnelstitch_geometry::trajectory::Pose;
@@ -43,8 +44,8 @@ pub struct PosedFrame {
 pub struct Exclusions<'a> {
     /// Ignored parts of the wall.
     pub ignored: &'a WallRegions,
-    /// Mask of the pixels that show the wall, at the frames' level; None for all pixels.
-    pub mask: Option<PyramidMask>,
+    /// Masks of the pixels that show the wall.
+    pub masks: &'a Masks,
 }
 
 #[cfg(test)]
@@ -52,7 +53,7 @@ impl Exclusions<'_> {
     /// No exclusions.
     pub const NONE: Exclusions<'static> = Exclusions {
         ignored: &WallRegions::NONE,
-        mask: None,
+        masks: &Masks::NONE,
     };
 }
 
@@ -78,7 +79,7 @@ impl Visibility {
     pub fn find(
         surface: &dyn Surface,
         grid: &WallGrid,
-        camera: &Camera,
+        cameras: &Cameras,
         light: Option<&CameraLight>,
         exclusions: &Exclusions,
         posed: &[PosedFrame],
@@ -92,14 +93,15 @@ impl Visibility {
         let corners = numbering.corners(surface, &ranges, exclusions.ignored);
         let observed: Vec<Vec<(usize, Observer)>> = (0..posed.len()).par_map(|k| {
             let (frame, range) = (&posed[k], &ranges[k]);
-            let camera = &camera.with_sweep(&frame.sweep);
+            let camera = &cameras.of(frame.index).with_sweep(&frame.sweep);
             let mut tiles = Vec::new();
-            let mask = exclusions.mask.as_ref();
+            let mask = exclusions.masks.of(frame.index);
+            let mask = mask.map(|mask| PyramidMask::for_camera(Arc::clone(mask), camera));
             for tile in numbering.numbers(range) {
                 let Some(corners) = &corners[tile] else {
                     continue;
                 };
-                let projection = project_tile(grid, camera, mask, &frame.pose, corners);
+                let projection = project_tile(grid, camera, mask.as_ref(), &frame.pose, corners);
                 if let Some(projection) = projection {
                     tiles.push((tile, projection.observer(k, frame.index, camera, light)));
                 }
@@ -234,7 +236,7 @@ mod tests {
         let found = Visibility::find(
             &circle,
             &grid,
-            &camera,
+            &camera.into(),
             None,
             &Exclusions::NONE,
             &posed,
@@ -267,7 +269,15 @@ mod tests {
         let (circle, camera, grid, posed) = posed_spiral(6);
         let exclusions = Exclusions::NONE;
         let rows = -1000..1000;
-        let all = Visibility::find(&circle, &grid, &camera, None, &exclusions, &posed, &rows);
+        let all = Visibility::find(
+            &circle,
+            &grid,
+            &camera.into(),
+            None,
+            &exclusions,
+            &posed,
+            &rows,
+        );
         for (k, tile) in all.tiles.iter().enumerate() {
             assert_eq!(all.tile(tile.id).map(|(found, _)| found), Some(k));
         }
@@ -295,7 +305,7 @@ mod tests {
             Visibility::find(
                 &circle,
                 &grid,
-                &camera,
+                &camera.into(),
                 None,
                 &Exclusions::NONE,
                 &posed,

@@ -21,7 +21,7 @@ use crate::uncertainty::frame_sigma::FrameSigma;
 use crate::uncertainty::rolling_shutter_test::estimate_readout;
 use crate::uncertainty::shape_report::{EstimatedShape, ShapeReport};
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
-use crate::validation::inconsistent_frames::find_inconsistent_frames;
+use crate::validation::inconsistent_frames::{find_inconsistent_frames, relation_ties};
 use crate::validation::pairwise_lucas_kanade::align_pairs;
 use crate::verdict::frame_verdict::FrameEvidence;
 
@@ -135,7 +135,8 @@ fn reject_inconsistent(
 ) -> Result<(), ProblemError> {
     let (count, finest) = (setup.count(), setup.handover_level());
     let pairs = align_pairs(context, finest, &state.frames, &(0..count))?;
-    for (frame, rejection) in find_inconsistent_frames(&pairs, count, setup.options) {
+    let ties = relation_ties(context);
+    for (frame, rejection) in find_inconsistent_frames(&pairs, &ties, count, setup.options) {
         state.frames.rejections[frame].get_or_insert(rejection);
     }
     Ok(())
@@ -161,8 +162,8 @@ fn judge(
     sigmas: &[FrameSigma],
     rejections: &mut [Option<RejectionReason>],
 ) {
-    let camera = &setup.input.camera;
-    let all_pixels = f64::from(camera.width) * f64::from(camera.height);
+    let [width, height] = setup.input.cameras.size().map(f64::from);
+    let all_pixels = width * height;
     for (k, rejection) in rejections.iter_mut().enumerate() {
         let evidence = FrameEvidence {
             rejection: rejection.take(),

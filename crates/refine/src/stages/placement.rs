@@ -21,13 +21,14 @@ use crate::uncertainty::shape_report::{EstimatedShape, ShapeReport};
 use crate::verdict::bridging::Bridging;
 use crate::verdict::length_scale::LengthScale;
 use crate::verdict::prior_test::PriorTest;
+use crate::verdict::rig_report::MountReport;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use nalgebra::{Matrix6, Vector3};
 use std::sync::Arc;
 use tunnelstitch_core::frames::Light;
 use tunnelstitch_core::survey::MaskedWall;
 use tunnelstitch_geometry::surface::{Bend, GaugeMotion, Surface, WallPoint, bent};
-use tunnelstitch_geometry::trajectory::{Pose, StampedPose};
+use tunnelstitch_geometry::trajectory::{Pose, Rig, StampedPose, Trajectory, poses_of};
 
 /// The final poses of all frames, and the verdict that they follow from.
 pub struct Placement {
@@ -164,7 +165,7 @@ impl Placement {
     /// The report of frame `k`, without what the last solve says of it; `sigma`: by that solve.
     pub fn report_frame(&self, setup: &Setup, k: usize, sigma: FrameSigma) -> FrameReport {
         let rejection = self.rejections[k].as_ref();
-        let (surface, camera) = (self.nominal.as_ref(), &setup.input.camera);
+        let (surface, camera) = (self.nominal.as_ref(), setup.input.cameras.of(k));
         FrameReport {
             index: k,
             file: setup.input.frames[k].name(),
@@ -221,8 +222,16 @@ impl Placement {
             time_s: initial.time_s,
             pose,
         });
+        let trajectory: Trajectory = poses.collect();
+        let rig = setup.input.rig.as_ref();
+        let mounts = rig.map_or_else(Vec::new, |rig| {
+            let is_photometric = self.rejections.iter().map(Option::is_none);
+            let is_photometric: Vec<bool> = is_photometric.collect();
+            MountReport::of_rig(rig, &poses_of(&trajectory), &is_photometric)
+        });
         Refined {
-            trajectory: poses.collect(),
+            bodies: rig.map(|rig| bodies(rig, &trajectory)),
+            trajectory,
             report: RefineReport {
                 frames_on_prior: parts.frames.len() - photometric.len(),
                 frames: parts.frames,
@@ -240,6 +249,7 @@ impl Placement {
                 variance_factor: self.covariances.variance_factor,
                 model_error: parts.model_error,
                 prior_test: self.prior_test,
+                mounts,
                 verdict,
                 scale: length_scale,
                 shape: parts.shape,
@@ -261,6 +271,15 @@ impl Placement {
             masked,
         }
     }
+}
+
+/// The poses of a rig's body by those of its cameras, at the times of the moments.
+fn bodies(rig: &Rig, trajectory: &[StampedPose]) -> Trajectory {
+    let of_moment = |frames: &[StampedPose]| StampedPose {
+        time_s: frames[0].time_s,
+        pose: rig.body(&poses_of(frames)),
+    };
+    trajectory.chunks(rig.cameras()).map(of_moment).collect()
 }
 
 /// Displacement of the wall's points, on the unrolled wall, by a motion along the gauge: that of

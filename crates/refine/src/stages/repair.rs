@@ -34,7 +34,12 @@ pub fn run<'a>(
     for (frame, motion) in aliases {
         let pose = &state.frames.estimates[frame].pose;
         let other = motion.apply(pose);
-        let separation_m = separation_m(context.surface.as_ref(), &context.camera, pose, &other);
+        let separation_m = separation_m(
+            context.surface.as_ref(),
+            context.cameras.of(frame),
+            pose,
+            &other,
+        );
         let ambiguous = RejectionReason::Ambiguous {
             other,
             separation_m,

@@ -84,8 +84,8 @@ impl<'a> Session<'a> {
 
     /// Reports the place of the state's first stage in the whole refinement.
     pub fn enter_stage(&self, setup: &Setup, state: &PipelineState) {
-        let camera = &setup.input.camera;
-        let pixels = f64::from(camera.width) * f64::from(camera.height);
+        let [width, height] = setup.input.cameras.size().map(f64::from);
+        let pixels = width * height;
         let place = place_in_job(&state.over, &state.stages, pixels);
         self.progress.enter_job_stage(place);
     }

@@ -16,15 +16,16 @@ use crate::point_fit::fit::{FittedWall, PointFit};
 use crate::points::wall_points::WallPoints;
 use crate::samples::footprints::{extent_h_m, footprints};
 use crate::stages::state::PipelineState;
+use crate::thresholds::tracking::REGISTERED_SHARE;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_core::survey::{CalibrationGroup, DEFAULT_SHAPE_SIGMA_RADII};
 use tunnelstitch_geometry::surface::{RadialField, bent, displaced};
-use tunnelstitch_geometry::trajectory::Pose;
+use tunnelstitch_geometry::trajectory::{Jitter, Pose, Rig};
 
 /// The input and the options of a refinement, with what follows from both.
 pub struct Setup<'a> {
-    /// Frames, poses, camera and tunnel.
+    /// Frames, poses, cameras and tunnel.
     pub input: RefineInput<'a>,
     /// The options.
     pub options: &'a RefineOptions,
@@ -32,8 +33,8 @@ pub struct Setup<'a> {
     pub frames: FrameCache,
     /// Noise of the initial poses and exposures.
     pub prior: Prior,
-    /// The prior widened by the uncertainty of the shared parameters, for registering frames before
-    /// these are estimated.
+    /// The prior widened by the uncertainty of the shared parameters and, in a rig, of a registered
+    /// frame, for registering frames before all are estimated.
     pub tracking_prior: Prior,
     /// The shared parameters that are asked for, and the priors of all.
     pub calibration: Calibration,
@@ -56,7 +57,8 @@ impl<'a> Setup<'a> {
     ///
     /// # Errors
     /// [`RefineError::SingleFrame`], [`RefineError::PoseCount`], [`RefineError::NoMotion`],
-    /// [`RefineError::OnlyRound`], [`RefineError::GivenByPoints`], [`RefineError::Points`].
+    /// [`RefineError::OnlyRound`], [`RefineError::LensOfRig`], [`RefineError::GivenByPoints`],
+    /// [`RefineError::Points`].
     pub fn new(input: RefineInput<'a>, options: &'a RefineOptions) -> Result<Self, RefineError> {
         if input.frames.len() < 2 {
             return Err(RefineError::SingleFrame);
@@ -68,17 +70,24 @@ impl<'a> Setup<'a> {
         if is_motionless(input.initial) {
             return Err(RefineError::NoMotion { frames });
         }
-        let coarsest = options.coarsest_level(input.camera.shorter_side());
+        let coarsest = options.coarsest_level(input.cameras.shorter_side());
         let frames = FrameCache::new(
             input.frames,
-            &input.camera,
+            input.cameras.size(),
             coarsest + 1,
             options.cache_bytes,
         );
-        let prior = Prior::new(input.prior, input.initial, input.pose_gaps, options);
+        let prior = Prior::new(
+            input.prior,
+            input.rig.as_ref(),
+            input.initial,
+            input.pose_gaps,
+            options,
+        );
         let calibration = calibration_of(&input, options, &prior.initial)?;
         let tracking_prior = Prior {
             jitter: calibration.widen_jitter(&prior.jitter, prior.lever_arm_m()),
+            rig: prior.rig.as_ref().map(|rig| loosened(rig, &prior.jitter)),
             ..prior.clone()
         };
         let shape_sigma_m = match options.shape {
@@ -158,13 +167,13 @@ impl<'a> Setup<'a> {
     /// The coarsest pyramid level.
     pub fn coarsest_level(&self) -> usize {
         self.options
-            .coarsest_level(self.input.camera.shorter_side())
+            .coarsest_level(self.input.cameras.shorter_side())
     }
 
     /// The finest pyramid level of tracking.
     pub fn handover_level(&self) -> usize {
         self.options
-            .handover_level(self.input.camera.shorter_side())
+            .handover_level(self.input.cameras.shorter_side())
     }
 
     /// The shared parameters with those fixed that have turned out unobservable.
@@ -172,7 +181,7 @@ impl<'a> Setup<'a> {
         Calibration {
             free: state.free,
             tested: state.tested,
-            ..self.calibration
+            ..self.calibration.clone()
         }
     }
 
@@ -190,9 +199,9 @@ impl<'a> Setup<'a> {
             shape: None,
             points: (self.wall.as_ref()).map(|wall| Arc::clone(&wall.observations)),
             ignored: self.input.ignored,
-            camera: self.input.camera,
+            cameras: self.input.cameras.clone(),
             shutter: &self.input.shutter,
-            calibration: self.calibration,
+            calibration: self.calibration.clone(),
             kappa: Kappa::zeros(),
             frames: &self.frames,
             prior: &self.prior,
@@ -234,10 +243,23 @@ impl<'a> Setup<'a> {
     }
 }
 
+/// A rig for registering frames one after another: the place of a camera by that of another one is
+/// as uncertain as the other's, which until all are solved together is a share of the noise of a
+/// step.
+fn loosened(rig: &Rig, jitter: &Jitter) -> Rig {
+    let [x, y, z] = jitter.translation_sigma_m;
+    let rotation_rad = REGISTERED_SHARE * jitter.rotation_sigma_rad;
+    let translation_m = REGISTERED_SHARE * x.min(y).min(z);
+    rig.clone().with_sigmas(
+        rig.rotation_sigma_rad.hypot(rotation_rad),
+        rig.translation_sigma_m.hypot(translation_m),
+    )
+}
+
 /// The shared parameters to be estimated, with their priors.
 ///
 /// # Errors
-/// [`RefineError::OnlyRound`].
+/// [`RefineError::OnlyRound`], [`RefineError::LensOfRig`].
 fn calibration_of(
     input: &RefineInput,
     options: &RefineOptions,
@@ -245,7 +267,14 @@ fn calibration_of(
 ) -> Result<Calibration, RefineError> {
     let section = &input.calibrate;
     let groups = options.calibrate.as_ref().unwrap_or(&section.unknowns);
-    let calibration = Calibration::new(groups, section, &input.camera, initial);
+    let lens = |group: &&CalibrationGroup| {
+        use CalibrationGroup::{Centre, Distortion, Focal};
+        matches!(group, Focal | Centre | Distortion)
+    };
+    if input.cameras.is_rig() && groups.iter().any(|group| lens(&group)) {
+        return Err(RefineError::LensOfRig);
+    }
+    let calibration = Calibration::new(groups, section, &input.cameras, initial);
     let is_straight_and_round = input.surface.gauge().degrees_of_freedom() == 2;
     for (group, unknown) in [
         (CalibrationGroup::Radius, "the radius"),

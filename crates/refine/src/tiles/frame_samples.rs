@@ -332,7 +332,7 @@ mod tests {
     #[test]
     fn shared_jacobian_matches_central_differences() {
         let circle = Circle::new(3.0).unwrap();
-        let calibration = Calibration::none(&Camera {
+        let calibration = Calibration::none(Camera {
             lens: Lens::radial(-0.1, 0.02),
             ..Camera::from_vertical_fov(160, 120, 60f64.to_radians())
         });
@@ -342,7 +342,7 @@ mod tests {
             Vector3::new(0.4, 10.0, -0.2),
         ));
         let pose = estimate.pose;
-        let camera = calibration.given;
+        let camera = *calibration.given.of(0);
         let rate = Sweep {
             omega_rad: Vector3::new(0.1, 0.5, -0.2),
             nu_m: Vector3::new(0.3, -0.1, 0.2),
@@ -371,7 +371,7 @@ mod tests {
                 if k < INTRINSIC_PARAMETERS {
                     kappa[k] = amount;
                 }
-                let camera = calibration.camera(&kappa).unwrap();
+                let camera = *calibration.cameras(&kappa).unwrap().of(0);
                 let readout_s = if k == INTRINSIC_PARAMETERS {
                     amount
                 } else {

@@ -108,7 +108,7 @@ impl AlternatingCalibration {
         mut checkpoint: impl FnMut(&Self) -> Result<(), ProblemError>,
     ) -> Result<Option<FrameStates>, ProblemError> {
         let mut context = EstimationContext {
-            calibration: context.calibration.intrinsics_only(),
+            calibration: context.calibration.clone().intrinsics_only(),
             ..context.clone()
         }
         .at(self.kappa);
@@ -131,9 +131,9 @@ impl AlternatingCalibration {
             if !context.calibration.has_free_parameters() {
                 return Ok(Some(states));
             }
-            let before = context.camera;
+            let before = *context.cameras.of(0);
             context = context.at(states.kappa);
-            let level = options.handover_level(context.camera.shorter_side());
+            let level = options.handover_level(context.cameras.shorter_side());
             let problem = PhotometricProblem::new(&context, Sampling::of(level), states.window())?;
             if problem.tiles() > 0 {
                 let solution = solve(problem.with_shared_parameters(), stopping)?;
@@ -142,7 +142,7 @@ impl AlternatingCalibration {
             }
             context = context.at(states.kappa);
             self.round += 1;
-            let change_px = border_displacement_px(&before, &context.camera);
+            let change_px = border_displacement_px(&before, context.cameras.of(0));
             // Half a pixel of the level where tracking ends changes no registration.
             if change_px < 0.5 * 2f64.powi(level as i32) || self.round == MAX_TRACKING_ITERATIONS {
                 return Ok(Some(states));

@@ -10,7 +10,7 @@ use crate::thresholds::correlation_search::SAMPLES_PER_INDEPENDENT_PIECE;
 use crate::tracking::light_model::LightModel;
 use nalgebra::Vector2;
 use tunnelstitch_core::frames::{GreyImage, Lamp, MeanShading, Shading};
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::mean_radius_m;
 use tunnelstitch_geometry::trajectory::Pose;
@@ -26,12 +26,10 @@ pub fn first_light(
     level: usize,
     alpha: f64,
 ) -> Option<LightModel> {
-    let size = (
-        context.camera.width as usize,
-        context.camera.height as usize,
-    );
+    let [width, height] = context.cameras.size();
+    let size = (width as usize, height as usize);
     let lamp = Lamp::at_camera(mean_radius_m(context.surface.as_ref()));
-    let falloff = mean_falloff(context, &context.camera.at_level(level), &lamp);
+    let falloff = mean_falloff(context, &context.cameras.at_level(level), &lamp);
     let fit = |light: fn(f64) -> f64| {
         let seen = mean.data().iter().zip(&falloff);
         let divided = seen.map(|(value, falloff)| {
@@ -60,19 +58,20 @@ pub fn first_light(
     })
 }
 
-/// The mean light of a lamp over a few frames at their initial poses, at every pixel of `camera`;
-/// None where none of them shows wall in range.
-fn mean_falloff(context: &EstimationContext, camera: &Camera, lamp: &Lamp) -> Vec<Option<f64>> {
+/// The mean light of a lamp over a few frames at their initial poses, at every pixel of their
+/// `cameras`; None where none of them shows wall in range.
+fn mean_falloff(context: &EstimationContext, cameras: &Cameras, lamp: &Lamp) -> Vec<Option<f64>> {
     let surface = context.surface.as_ref();
     let initial = &context.prior.initial;
-    let poses: Vec<&Pose> = (initial.iter())
+    let poses: Vec<(usize, &Pose)> = (initial.iter().enumerate())
         .step_by(initial.len().div_ceil(MEAN_FRAMES).max(1))
         .collect();
-    let width = camera.width as usize;
-    (0..width * camera.height as usize).par_map(|k| {
+    let [width, height] = cameras.size().map(|side| side as usize);
+    (0..width * height).par_map(|k| {
         let pixel = Vector2::new((k % width) as f64, (k / width) as f64);
         let logs = poses.iter();
-        let logs = logs.filter_map(|pose| lamp.log_seen_at(&pixel, surface, camera, pose));
+        let logs =
+            logs.filter_map(|(k, pose)| lamp.log_seen_at(&pixel, surface, cameras.of(*k), pose));
         let seen: Vec<f64> = logs.map(f64::exp).collect();
         (!seen.is_empty()).then(|| seen.iter().sum::<f64>() / seen.len() as f64)
     })
@@ -91,14 +90,14 @@ mod tests {
         let wall = TestWall::ring(waves);
         with_context(&wall, wall.frames(), poses, |context, _| {
             let lamp = Lamp::at_camera(mean_radius_m(context.surface.as_ref()));
-            let falloff = mean_falloff(context, &context.camera, &lamp);
+            let falloff = mean_falloff(context, &context.cameras, &lamp);
             let lit = falloff.iter().enumerate().map(|(k, falloff)| {
                 let texture = 1.0 + 0.02 * (12.9898 * k as f64).sin();
                 falloff.map_or(f32::NAN, |falloff| {
                     (100.0 * light(falloff) * texture) as f32
                 })
             });
-            let (w, h) = (context.camera.width, context.camera.height);
+            let [w, h] = context.cameras.size();
             let mean = GreyImage::new(w as usize, h as usize, lit.collect());
             first_light(context, &mean, 0, 1e-3)
         })

@@ -88,15 +88,15 @@ mod tests {
         pictures.truncate(poses.len());
         with_context(&wall, pictures, poses, |context, states| {
             let given = Camera {
-                fx: factor * context.camera.fx,
-                fy: factor * context.camera.fy,
-                ..context.camera
+                fx: factor * wall.camera.fx,
+                fy: factor * wall.camera.fy,
+                ..wall.camera
             };
-            let mut calibration = Calibration::none(&given);
+            let mut calibration = Calibration::none(given);
             calibration.free[FOCAL_INDEX] = true;
             calibration.sigma[FOCAL_INDEX] = sigma;
             let context = EstimationContext {
-                camera: given,
+                cameras: given.into(),
                 calibration,
                 ..context.clone()
             };

@@ -20,8 +20,8 @@ pub struct LightModel {
 impl LightModel {
     /// The light that frames are divided by; an even one if they are not.
     pub fn present(context: &EstimationContext) -> Self {
-        let camera = &context.camera;
-        let size = (camera.width as usize, camera.height as usize);
+        let [width, height] = context.cameras.size();
+        let size = (width as usize, height as usize);
         match context.frames.camera_light() {
             Some(light) => Self {
                 shading: light.shading.clone(),
@@ -88,8 +88,10 @@ impl LightModel {
             };
             let poses: Vec<Pose> = initial.map(pose).collect();
             let surface = context.surface.as_ref();
-            let falloff = |pose: &Pose| Falloff::new(&lamp, surface, &context.camera, pose);
-            (lamp, poses.par_map(falloff))
+            let frames: Vec<usize> = (0..poses.len()).collect();
+            let falloff =
+                |k: &usize| Falloff::new(&lamp, surface, context.cameras.of(*k), &poses[*k]);
+            (lamp, frames.par_map(falloff))
         };
         let light = CameraLight {
             shading: self.shading,

@@ -64,7 +64,7 @@ fn register_second(
     }
     let estimates = &states.estimates[frame_range.clone()];
     let seen = frame_range.clone().zip(estimates).map(|(k, estimate)| {
-        let camera = context.camera.with_sweep(&states.sweep(context, k));
+        let camera = context.cameras.of(k).with_sweep(&states.sweep(context, k));
         footprint(context, &camera, k, &estimate.pose)
     });
     let Ok(footprints) = seen.collect::<Result<Vec<_>, _>>() else {

@@ -51,7 +51,7 @@ impl Neighbours<'_> {
         margin_m: f64,
     ) -> Result<Vec<bool>, ProblemError> {
         let perimeter = context.surface.perimeter_m();
-        let own = footprint(context, &context.camera, frame, pose)?;
+        let own = footprint(context, context.cameras.of(frame), frame, pose)?;
         let widened = own.widened(margin_m);
         let place = frame - self.frame_range.start;
         let mut found: Vec<usize> = (0..self.registered.len())

@@ -2,7 +2,6 @@
 
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
-use crate::model::prior::predict;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
 use tunnelstitch_geometry::trajectory::{JitterModel, Pose};
 
@@ -18,6 +17,8 @@ pub struct PosePrediction {
 /// Predicts the pose of frame `frame` from the inliers around it; falls back to the initial pose if
 /// the prediction lies outside the tunnel.
 ///
+/// - In a rig, from an inlier of the same moment, as far as there is one: by the relation of their
+///   cameras.
 /// - Random walk: the nearest inlier's pose, followed by the initial steps from there. Its σ grows
 ///   with the square root of the number of steps.
 /// - Independent errors: the initial pose, moved by the gauge motion (rotation about the axis,
@@ -48,17 +49,22 @@ fn predict_pose_unchecked(
     let around = frame.saturating_sub(MAX_OVERLAP_DISTANCE_FRAMES)
         ..(frame + MAX_OVERLAP_DISTANCE_FRAMES).min(states.estimates.len());
     let inliers = around.filter(|i| *i != frame && states.rejections[*i].is_none());
-    match context.prior.jitter.model {
+    let prior = context.prior;
+    let from = |nearest: usize| {
+        let pose = &states.estimates[nearest].pose;
+        let (first, last) = (nearest.min(frame), nearest.max(frame));
+        PosePrediction {
+            pose: prior.predict_at(&metric, nearest, pose, frame),
+            sigma_scale: prior.steps_between(first, last).sqrt(),
+        }
+    };
+    let of_moment = inliers.clone().filter(|i| prior.is_same_moment(*i, frame));
+    if let Some(nearest) = of_moment.min_by_key(|i| i.abs_diff(frame)) {
+        return from(nearest);
+    }
+    match prior.jitter.model {
         JitterModel::RandomWalk => match inliers.min_by_key(|i| i.abs_diff(frame)) {
-            Some(nearest) => {
-                let pose = &states.estimates[nearest].pose;
-                let (from, to) = (nearest.min(frame), nearest.max(frame));
-                let steps = context.prior.steps_between(from, to);
-                PosePrediction {
-                    pose: predict(pose, &initial(nearest), &initial(frame)),
-                    sigma_scale: steps.sqrt(),
-                }
-            }
+            Some(nearest) => from(nearest),
             None => PosePrediction {
                 pose: initial(frame),
                 sigma_scale: context.prior.variance_ratios[frame].sqrt(),

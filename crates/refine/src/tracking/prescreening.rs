@@ -40,7 +40,9 @@ pub fn prescreen(
     progress.start("decoding", count);
     let mut rejections = Vec::with_capacity(count);
     let mut sums: Vec<[f64; 2]> = Vec::new();
-    let mut last: Option<(usize, GreyImage)> = None;
+    let cameras = context.cameras.count();
+    // The last frame of each camera that shows something.
+    let mut last: Vec<Option<(usize, GreyImage)>> = vec![None; cameras];
     let mut size = (0, 0);
     let mut noises = Vec::new();
     for start in (0..count).step_by(BATCH) {
@@ -56,7 +58,7 @@ pub fn prescreen(
             size = (picture.width(), picture.height());
             sums.resize(size.0 * size.1, [0.0; 2]);
             let (mean, spread, known) = compute_moments(&picture);
-            let repeated = last.as_ref().filter(|(earlier, other)| {
+            let repeated = last[k % cameras].as_ref().filter(|(earlier, other)| {
                 rms_difference(other, &picture) < MAX_REPEAT_DIFFERENCE_GREY
                     && has_moved(context, *earlier, k, coarsest)
             });
@@ -74,7 +76,7 @@ pub fn prescreen(
                         sum[1] += 1.0;
                     }
                 }
-                last = Some((k, picture));
+                last[k % cameras] = Some((k, picture));
             }
         }
     }
@@ -123,10 +125,12 @@ fn rms_difference(a: &GreyImage, b: &GreyImage) -> f64 {
 /// picture by more than a pixel of the coarsest level, where pictures are compared.
 fn has_moved(context: &EstimationContext, a: usize, b: usize, coarsest: usize) -> bool {
     let (from, to) = (&context.prior.initial[a], &context.prior.initial[b]);
-    let Ok(distance_m) = viewing_distance(context.surface.as_ref(), &context.camera, from) else {
+    let Ok(distance_m) = viewing_distance(context.surface.as_ref(), context.cameras.of(a), from)
+    else {
         return true;
     };
     let rotation = from.r_wc.angle_to(&to.r_wc);
     let translation = (to.t_wc - from.t_wc).norm() / distance_m;
-    (rotation + translation) * context.camera.vertical_focal_px() > 2f64.powi(coarsest as i32)
+    (rotation + translation) * context.cameras.of(a).vertical_focal_px()
+        > 2f64.powi(coarsest as i32)
 }

@@ -96,9 +96,11 @@ pub fn register_frame(
     neighbours: &Neighbours,
     effort: &mut Effort,
 ) -> Result<Result<Registered, RejectionReason>, ProblemError> {
-    let Ok(distance_m) =
-        viewing_distance(context.surface.as_ref(), &context.camera, &predicted.pose)
-    else {
+    let Ok(distance_m) = viewing_distance(
+        context.surface.as_ref(),
+        context.cameras.of(frame),
+        &predicted.pose,
+    ) else {
         return Ok(Err(RejectionReason::NoMatch { correlation: 0.0 }));
     };
     let registration =
@@ -106,13 +108,16 @@ pub fn register_frame(
     let hypotheses = registration.search();
     let mut candidates = registration.refine_hypotheses(&hypotheses, effort)?;
     sort_candidates(&mut candidates);
-    let camera = context.camera.at_level(registration.search_level);
+    let camera = context
+        .cameras
+        .of(frame)
+        .at_level(registration.search_level);
     let pixel_size =
         |candidate: &Candidate| pixel_size_m(context, &camera, &candidate.estimate.pose);
     let chosen = choose_candidate(
         &candidates,
         context.surface.as_ref(),
-        &context.camera,
+        context.cameras.of(frame),
         pixel_size,
     );
     match chosen {
@@ -152,11 +157,11 @@ impl<'r> Registration<'r> {
         neighbours: &'r Neighbours<'r>,
         distance_m: f64,
     ) -> Result<Self, ProblemError> {
-        let side = context.camera.shorter_side();
+        let side = context.cameras.shorter_side();
         let coarsest_level = options.coarsest_level(side);
         let finest_level = options.handover_level(side);
         let search_level = finest_level.max(coarsest_level.saturating_sub(1));
-        let camera = context.camera.at_level(search_level);
+        let camera = context.cameras.of(frame).at_level(search_level);
         let jitter = &context.prior.jitter;
         let sigma_rad = jitter.search_sigma_rad(distance_m, predicted.sigma_scale);
         // Beyond half a turn there is no more wall to look at.

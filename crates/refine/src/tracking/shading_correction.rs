@@ -39,7 +39,7 @@ pub fn correct_until_settled(
     options: &RefineOptions,
     frames: &mut FrameStates,
 ) -> Result<Vec<(usize, Vector2<f64>)>, ProblemError> {
-    let side = context.camera.shorter_side();
+    let side = context.cameras.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
     let mut observed = Vec::new();
     for _ in 0..MAX_TRACKING_ITERATIONS {

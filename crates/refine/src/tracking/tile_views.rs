@@ -56,7 +56,7 @@ impl TileViews {
         frames: &FrameStates,
     ) -> Result<Self, ProblemError> {
         let range = calibrated_frames(frames.estimates.len());
-        let level = options.handover_level(context.camera.shorter_side());
+        let level = options.handover_level(context.cameras.shorter_side());
         let window = frames.window_of(range.clone(), range.clone());
         let problem = PhotometricProblem::new(context, Sampling::of(level), window)?;
         let estimates = frames.estimates[range.clone()].iter();

@@ -36,8 +36,8 @@ pub struct Tracking {
     states: FrameStates,
     /// The parts of the wall that they saw when they were tracked.
     footprints: Vec<Footprint>,
-    /// The first frame that the last tracked one may share wall with.
-    earliest_overlap: usize,
+    /// The first frame that the last tracked one of each camera may share wall with.
+    earliest_overlaps: Vec<usize>,
     /// The last shared parameters κ that made a valid camera.
     kappa: Kappa,
     /// Frames that were registered on others, or were tried to.
@@ -62,7 +62,7 @@ impl Tracking {
                 kappa,
             },
             footprints: Vec::new(),
-            earliest_overlap: 0,
+            earliest_overlaps: Vec::new(),
             kappa,
             attempts: 0,
             successes: 0,
@@ -121,13 +121,17 @@ impl Tracking {
         }
         let estimate = FrameEstimate::at(predicted.pose);
         self.states.estimates.push(estimate);
-        self.footprints
-            .push(footprint(context, &context.camera, k, &predicted.pose)?);
+        self.footprints.push(footprint(
+            context,
+            context.cameras.of(k),
+            k,
+            &predicted.pose,
+        )?);
         let first = find_earliest_overlap(context, &self.footprints);
         let is_reliable = self.register(context, options, &predicted, first)?;
         self.solve_windows(context, options, first, is_reliable)?;
         let pose = &self.states.estimates[k].pose;
-        self.footprints[k] = footprint(context, &context.camera, k, pose)?;
+        self.footprints[k] = footprint(context, context.cameras.of(k), k, pose)?;
         Ok(())
     }
 
@@ -143,8 +147,10 @@ impl Tracking {
         let k = self.tracked_frames() - 1;
         // The frame overlaps earlier frames than the one before it did: a turn has closed on wall
         // that was tracked without it, and the drift in between may be many pixels.
-        let closes_turn = first < self.earliest_overlap;
-        self.earliest_overlap = first;
+        self.earliest_overlaps.resize(context.cameras.count(), 0);
+        let camera = k % context.cameras.count();
+        let before = std::mem::replace(&mut self.earliest_overlaps[camera], first);
+        let closes_turn = first < before;
         self.frames_since_window += 1;
         let stride = options
             .window_stride
@@ -269,7 +275,7 @@ pub fn register_rejected(
             }
             Err(_) => FrameEstimate::at(predicted.pose),
         };
-        footprints[k] = footprint(context, &context.camera, k, &states.estimates[k].pose)?;
+        footprints[k] = footprint(context, context.cameras.of(k), k, &states.estimates[k].pose)?;
     }
     Ok(registered_frames)
 }

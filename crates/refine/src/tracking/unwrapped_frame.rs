@@ -33,7 +33,7 @@ impl UnwrappedFrame {
     ) -> Result<Self, ProblemError> {
         let pyramid = context.frames.get(frame)?;
         Ok(Self {
-            camera: context.camera.at_level(level).with_sweep(sweep),
+            camera: context.cameras.of(frame).at_level(level).with_sweep(sweep),
             local: pyramid.contrast(level),
             level,
             pyramid,
@@ -64,7 +64,7 @@ impl UnwrappedFrame {
             local_contrast(&mask_outliers(image), window_px)
         };
         Ok(Self {
-            camera: context.camera.at_level(level).with_sweep(sweep),
+            camera: context.cameras.of(frame).at_level(level).with_sweep(sweep),
             local: Arc::new(local),
             level,
             pyramid,

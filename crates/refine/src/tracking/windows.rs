@@ -37,7 +37,7 @@ pub fn solve_sliding_window(
     drifted: bool,
     states: &mut FrameStates,
 ) -> Result<(), ProblemError> {
-    let side = context.camera.shorter_side();
+    let side = context.cameras.shorter_side();
     let (finest, coarsest) = (options.handover_level(side), options.coarsest_level(side));
     let frame_range = first..states.estimates.len();
     let held = if first == 0 {
@@ -74,7 +74,7 @@ pub fn solve_long_window(
     options: &RefineOptions,
     states: &mut FrameStates,
 ) -> Result<(), ProblemError> {
-    let finest = options.handover_level(context.camera.shorter_side());
+    let finest = options.handover_level(context.cameras.shorter_side());
     let end = states.estimates.len();
     let start = end.saturating_sub(LONG_WINDOW_FRAMES);
     let held = if start == 0 { 0 } else { LONG_WINDOW_HELD };

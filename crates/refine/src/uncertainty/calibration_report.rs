@@ -40,7 +40,7 @@ pub struct UnknownReport {
 pub struct CalibrationReport {
     /// The parameters that were to be estimated.
     pub unknowns: Vec<UnknownReport>,
-    /// The camera to use with the poses.
+    /// The camera to use with the poses; of a rig, whose cameras are as given, its first.
     pub camera: Camera,
     /// The tunnel's radius to use with the poses, metres.
     pub radius_m: f64,
@@ -59,7 +59,7 @@ impl CalibrationReport {
         unobservable: &[UnobservableParameter],
         given_radius_m: f64,
     ) -> Self {
-        let given = &calibration.given;
+        let given = calibration.given.of(0);
         let [k1, k2] = given.lens.k1_k2();
         // The axis moves in the initial poses' frame as that frame would have to move back.
         let (point, direction) = calibration.datum(kappa).axis();
@@ -125,7 +125,7 @@ impl CalibrationReport {
         });
         Self {
             unknowns: unknowns.collect(),
-            camera: calibration.camera(kappa).unwrap_or(*given),
+            camera: (calibration.cameras(kappa)).map_or(*given, |cameras| *cameras.of(0)),
             radius_m,
             axis_point_m: point.into(),
             axis_direction: direction.into(),
@@ -141,7 +141,7 @@ mod tests {
         Calibration {
             free: [true; SHARED_PARAMETERS],
             sigma: Kappa::repeat(0.1),
-            ..Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0))
+            ..Calibration::none(Camera::from_vertical_fov(160, 120, 1.0))
         }
     }
 

@@ -103,8 +103,14 @@ pub fn pose_bounds(
     };
     let count = truth.len();
     let options = RefineOptions::default();
-    let prior = Prior::new(survey.prior, &survey.initial, &survey.pose_gaps, &options);
-    let camera = finer_camera(&survey.camera);
+    let prior = Prior::new(
+        survey.prior,
+        survey.rig.as_ref(),
+        &survey.initial,
+        &survey.pose_gaps,
+        &options,
+    );
+    let cameras = survey.cameras.map(finer_camera);
     let frames = fine
         .iter()
         .map(|frame| Pyramid::new(average_pixels(frame), 1));
@@ -120,9 +126,9 @@ pub fn pose_bounds(
         points: None,
         surface: Arc::clone(&survey.surface),
         ignored: &survey.ignored,
-        camera,
+        cameras: cameras.clone(),
         shutter: &shutter,
-        calibration: Calibration::none(&camera),
+        calibration: Calibration::none(cameras),
         kappa: Kappa::zeros(),
         frames: &frames,
         prior: &prior,

@@ -174,7 +174,7 @@ mod tests {
         Calibration {
             free: [true; SHARED_PARAMETERS],
             sigma: Kappa::repeat(0.1),
-            ..Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0))
+            ..Calibration::none(Camera::from_vertical_fov(160, 120, 1.0))
         }
     }
 

@@ -49,14 +49,14 @@ impl Overdispersion {
     /// V, `scatter`, over a number of `patches`. None if the others do not determine its pose.
     fn of_frame(
         context: &EstimationContext,
-        estimate: &FrameEstimate,
+        (k, estimate): (usize, &FrameEstimate),
         (information, scatter): (&Block, &Block),
         patches: f64,
     ) -> Option<Self> {
         let (q, covariance) = compute_dispersion(information, scatter)?;
         let sigma = compute_frame_sigma(
             context.surface.as_ref(),
-            &context.camera,
+            context.cameras.of(k),
             estimate,
             &covariance,
         );
@@ -94,7 +94,7 @@ pub fn compute_overdispersions(
         let scatter = at.scatter[place] * dispersion.powi(2);
         let blocks = (&information, &scatter);
         let patches = at.frames[k].samples as f64 / PATCH as f64;
-        Overdispersion::of_frame(context, estimate, blocks, patches)
+        Overdispersion::of_frame(context, (k, estimate), blocks, patches)
     };
     let frames = solution.unknowns.frames.iter().enumerate();
     frames

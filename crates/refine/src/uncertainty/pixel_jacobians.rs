@@ -85,11 +85,11 @@ pub struct PixelJacobians {
     pub tau: Vector2<f64>,
 }
 
-/// Derivatives of the wall point `wall` with tangents `frame`, seen through a fixed pixel from
-/// `pose`.
+/// Derivatives of the wall point `wall` with tangents `frame`, seen through a fixed pixel of a
+/// frame from its `pose`.
 pub fn pixel_jacobians(
     context: &EstimationContext,
-    pose: &Pose,
+    (index, pose): (usize, &Pose),
     wall: WallPoint,
     frame: &WallFrame,
 ) -> PixelJacobians {
@@ -98,7 +98,7 @@ pub fn pixel_jacobians(
     let mut shared = KappaJacobian::zeros();
     shared
         .fixed_columns_mut::<INTRINSIC_PARAMETERS>(0)
-        .copy_from(&lens_jacobian(pose, &a, &context.camera, &x_c));
+        .copy_from(&lens_jacobian(pose, &a, context.cameras.of(index), &x_c));
     if context.calibration.free[BEND_INDEX] {
         let straightened = context.surface.straightened(pose);
         shared

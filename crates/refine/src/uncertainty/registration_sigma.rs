@@ -36,7 +36,7 @@ pub fn registration_sigmas(
         };
         wall_sigma_px(
             context.surface.as_ref(),
-            &context.camera,
+            context.cameras.of(k),
             &estimates[k].pose,
             variance,
         )
@@ -52,7 +52,7 @@ fn registration_jacobians(
     hit: &Hit,
     frame: &WallFrame,
 ) -> Option<PointJacobians> {
-    let sees = |j: &usize| is_seen(context, &estimates[*j], &hit.x_w);
+    let sees = |j: &usize| is_seen(context, *j, &estimates[*j], &hit.x_w);
     let others: Vec<usize> = neighbours.iter().copied().filter(sees).collect();
     if others.is_empty() {
         return None;
@@ -61,7 +61,7 @@ fn registration_jacobians(
     let mut point = PointJacobians::default();
     let mut tau = Vector2::zeros();
     let mut add = |j: usize, share: f64| {
-        let pixel = pixel_jacobians(context, &estimates[j].pose, hit.wall, frame);
+        let pixel = pixel_jacobians(context, (j, &estimates[j].pose), hit.wall, frame);
         point.add_pixel(j, &pixel, share);
         tau += pixel.tau * share;
     };
@@ -75,7 +75,13 @@ fn registration_jacobians(
 }
 
 /// True if a frame shows a point of the wall.
-fn is_seen(context: &EstimationContext, estimate: &FrameEstimate, x_w: &Vector3<f64>) -> bool {
-    let pixel = context.camera.project(&estimate.pose.to_camera(x_w));
-    pixel.is_some_and(|pixel| context.camera.is_in_image(&pixel, 0.0))
+fn is_seen(
+    context: &EstimationContext,
+    frame: usize,
+    estimate: &FrameEstimate,
+    x_w: &Vector3<f64>,
+) -> bool {
+    let camera = context.cameras.of(frame);
+    let pixel = camera.project(&estimate.pose.to_camera(x_w));
+    pixel.is_some_and(|pixel| camera.is_in_image(&pixel, 0.0))
 }

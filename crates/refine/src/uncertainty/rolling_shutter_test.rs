@@ -59,15 +59,19 @@ pub fn estimate_readout(
     options: &RefineOptions,
     states: &FrameStates,
 ) -> Result<Option<ReadoutEstimate>, ProblemError> {
+    // Between neighbouring frames of a rig it is not the camera that moves.
+    if context.cameras.is_rig() {
+        return Ok(None);
+    }
     let count = states.estimates.len();
     let first = count.saturating_sub(MAX_FRAMES) / 2;
     let frame_range = first..(first + MAX_FRAMES).min(count);
     let calibration = free_readout(context);
     let context = &EstimationContext {
-        calibration,
+        calibration: calibration.clone(),
         ..context.clone()
     };
-    let level = options.handover_level(context.camera.shorter_side());
+    let level = options.handover_level(context.cameras.shorter_side());
     let window = states.window_of(frame_range.clone(), frame_range);
     let problem =
         PhotometricProblem::new(context, Sampling::of(level), window)?.with_shared_parameters();
@@ -112,9 +116,14 @@ pub fn estimate_readout(
 /// free, besides what is free already.
 fn free_readout(context: &EstimationContext) -> Calibration {
     use CalibrationGroup::{Centre, Distortion, Focal};
-    let mut calibration = context.calibration.intrinsics_only();
+    let mut calibration = context.calibration.clone().intrinsics_only();
     let section = CalibrateSection::default();
-    let intrinsics = Calibration::new(&[Focal, Centre, Distortion], &section, &context.camera, &[]);
+    let intrinsics = Calibration::new(
+        &[Focal, Centre, Distortion],
+        &section,
+        &context.cameras,
+        &[],
+    );
     let is_held = |k: &usize| intrinsics.free[*k] && !context.calibration.free[*k];
     for k in (0..INTRINSIC_PARAMETERS).filter(is_held) {
         (calibration.free[k], calibration.sigma[k]) = (true, intrinsics.sigma[k]);
@@ -131,14 +140,14 @@ fn free_readout(context: &EstimationContext) -> Calibration {
 /// takes a second, pixels.
 fn shift_px_per_s(context: &EstimationContext, states: &FrameStates) -> f64 {
     let all = 0..states.estimates.len();
-    let row_share = 1.0 - 1.0 / f64::from(context.camera.height);
+    let camera = context.cameras.of(0);
+    let row_share = 1.0 - 1.0 / f64::from(camera.height);
     let shift = |k: usize| {
         let pose = &states.estimates[k].pose;
-        let x_c = Vector3::z()
-            * viewing_distance(context.surface.as_ref(), &context.camera, pose).ok()?;
+        let x_c = Vector3::z() * viewing_distance(context.surface.as_ref(), camera, pose).ok()?;
         let rate = context.sweep_rate(k, &all, &states.estimates);
         let moved = rate.omega_rad.cross(&x_c) + rate.nu_m;
-        Some((context.camera.project_jacobian(&x_c) * moved).norm() * row_share)
+        Some((camera.project_jacobian(&x_c) * moved).norm() * row_share)
     };
     upper_median(all.clone().filter_map(shift).collect()).unwrap_or_default()
 }

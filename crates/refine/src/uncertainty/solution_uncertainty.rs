@@ -129,7 +129,7 @@ impl SolutionUncertainty {
         let frames = self.covariances.frames.len();
         let wall_variance = |hit: &Hit, frame: &WallFrame| {
             let total = self.total.as_ref()?;
-            let pixel = pixel_jacobians(context, &estimate.pose, hit.wall, frame);
+            let pixel = pixel_jacobians(context, (k, &estimate.pose), hit.wall, frame);
             let mut point = PointJacobians::default();
             point.add_pixel(k, &pixel, 1.0);
             let model = context.shape.as_ref().map(|shape| &shape.model);
@@ -140,7 +140,7 @@ impl SolutionUncertainty {
             registration_px: self.registration_px[k],
             ..compute_frame_sigma_by(
                 context.surface.as_ref(),
-                &context.camera,
+                context.cameras.of(k),
                 estimate,
                 &self.covariances.frames[k],
                 wall_variance,
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn all_free_parameters_are_marked() {
-        let mut calibration = Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0));
+        let mut calibration = Calibration::none(Camera::from_vertical_fov(160, 120, 1.0));
         calibration.sigma = Kappa::repeat(0.1);
         calibration.free[3] = true;
         let unobservable = mark_all_unobservable(&calibration, "because");

@@ -228,6 +228,7 @@ mod tests {
             times_s: (0..12).map(f64::from).collect(),
             median_step_s: 1.0,
             variance_ratios: vec![1.0; 12],
+            rig: None,
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
         }

@@ -34,7 +34,7 @@ pub fn find_alias_motions(
     states: &FrameStates,
     footprints: &[Footprint],
 ) -> Result<Vec<GaugeMotion>, ProblemError> {
-    let side = context.camera.shorter_side();
+    let side = context.cameras.shorter_side();
     let level = options
         .handover_level(side)
         .max(options.coarsest_level(side).saturating_sub(1));
@@ -56,7 +56,7 @@ pub fn find_alias_motions(
     if unwrapped_frames.is_empty() {
         return Ok(Vec::new());
     }
-    let camera = context.camera.at_level(level);
+    let camera = context.cameras.of(frame).at_level(level);
     let sweep = neighbours.sweep(context, frame);
     let unwrapped = UnwrappedFrame::new(context, level, frame, &sweep)?;
     let target = (frame, &pose);

@@ -3,8 +3,10 @@
 //! A frame is an inlier if it is aligned with every inlier that it shares wall with, and if such
 //! pairs tie it to the others. Agreement of neighbours is not enough: a group of frames can be
 //! right in itself and stand in the wrong place, if all that it shares with the others is a strip
-//! without texture, or the prior.
+//! without texture, or the prior. The relation of a rig's cameras ties them as a pair does, if it
+//! is known as well.
 
+use crate::model::context::EstimationContext;
 use crate::model::rejection::RejectionReason;
 use crate::model::significance::student_quantile;
 use crate::options::RefineOptions;
@@ -14,6 +16,7 @@ use crate::thresholds::inconsistent_frames::{
 };
 use crate::validation::alignment::Alignment;
 use tunnelstitch_geometry::numerics::median::upper_median;
+use tunnelstitch_geometry::surface::mean_radius_m;
 
 /// Rejects the frames of which the robust loss has rejected too many pixels at full size, so that
 /// the last solve leaves them out.
@@ -39,9 +42,10 @@ pub fn find_disagreement(share: &FrameContribution) -> Option<RejectionReason> {
 ///
 /// Of two misaligned frames one is wrong: the one with the largest share of its samples in
 /// misaligned pairs is rejected first, until no such pair is left. The inliers are the largest
-/// group of the rest that pairs tie together.
+/// group of the rest that pairs, or the `ties` of a rig ([`relation_ties`]), tie together.
 pub fn find_inconsistent_frames(
     alignments: &[Alignment],
+    ties: &[(usize, usize)],
     frames: usize,
     options: &RefineOptions,
 ) -> Vec<(usize, RejectionReason)> {
@@ -81,7 +85,9 @@ pub fn find_inconsistent_frames(
         // Pairs with too little texture to measure are left to the covariance.
         .filter(|p| !rejected[p.a] && !rejected[p.b])
         .filter(|p| p.sigma_px <= MAX_TYING_SIGMA_PX || p.sigma_px == f64::INFINITY);
-    let group = connected_components(aligned.map(|pair| (pair.a, pair.b)), frames);
+    let ties = ties.iter().filter(|(a, b)| !rejected[*a] && !rejected[*b]);
+    let pairs = aligned.map(|pair| (pair.a, pair.b)).chain(ties.copied());
+    let group = connected_components(pairs, frames);
     let mut sizes = vec![0usize; frames];
     // Frames without any measured pair are not judged here.
     let mut measured = vec![false; frames];
@@ -101,6 +107,22 @@ pub fn find_inconsistent_frames(
         (*k, RejectionReason::Disconnected { frames })
     }));
     rejections
+}
+
+/// Pairs of frames of one moment whose relation is known well enough to tie them: if its σ
+/// displaces the wall in the picture by no more than [`MAX_TYING_SIGMA_PX`].
+pub fn relation_ties(context: &EstimationContext) -> Vec<(usize, usize)> {
+    let Some(rig) = &context.prior.rig else {
+        return Vec::new();
+    };
+    let distance_m = mean_radius_m(context.surface.as_ref());
+    let sigma_rad = (rig.rotation_sigma_rad).hypot(rig.translation_sigma_m / distance_m);
+    let is_tied = |k: &usize| {
+        let focal_px = context.cameras.of(*k).vertical_focal_px();
+        context.prior.is_related(*k) && focal_px * sigma_rad <= MAX_TYING_SIGMA_PX
+    };
+    let later = (1..context.prior.initial.len()).filter(is_tied);
+    later.map(|k| (k - 1, k)).collect()
 }
 
 /// Limits of the displacement of a pair.
@@ -163,7 +185,7 @@ mod tests {
     use super::*;
 
     fn find(pairs: &[Alignment], frames: usize) -> Vec<(usize, RejectionReason)> {
-        find_inconsistent_frames(pairs, frames, &RefineOptions::default())
+        find_inconsistent_frames(pairs, &[], frames, &RefineOptions::default())
     }
 
     fn pair(a: usize, b: usize, error_px: f64) -> Alignment {
@@ -203,6 +225,16 @@ mod tests {
             rejections,
             vec![(4, RejectionReason::Misaligned { error_px: 2.0 })]
         );
+    }
+
+    /// Cameras that look at walls which the other one never sees.
+    #[test]
+    fn the_relation_of_a_rig_ties_groups_of_frames() {
+        let pairs = [chain(0..6), chain(6..10)].concat();
+        assert_eq!(find(&pairs, 10).len(), 4);
+        let options = RefineOptions::default();
+        let found = |ties| find_inconsistent_frames(&pairs, ties, 10, &options);
+        assert!(found(&[(2, 7)]).is_empty());
     }
 
     #[test]

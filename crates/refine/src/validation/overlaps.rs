@@ -6,7 +6,7 @@ use crate::model::problem_error::ProblemError;
 use crate::samples::footprints::footprint;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
 use std::ops::Range;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Footprint;
 
@@ -30,19 +30,19 @@ pub struct Batch {
 }
 
 impl Overlaps {
-    /// The overlaps of the inliers of `frame_range` at their present poses, through `camera`.
+    /// The overlaps of the inliers of `frame_range` at their present poses, through `cameras`.
     ///
     /// # Errors
     /// [`ProblemError::Placement`].
     pub fn of(
         context: &EstimationContext,
-        camera: &Camera,
+        cameras: &Cameras,
         states: &FrameStates,
         frame_range: &Range<usize>,
     ) -> Result<Self, ProblemError> {
         let footprints = (0..states.estimates.len()).par_map(|k| {
             if frame_range.contains(&k) && states.rejections[k].is_none() {
-                let camera = camera.with_sweep(&states.sweep(context, k));
+                let camera = cameras.of(k).with_sweep(&states.sweep(context, k));
                 footprint(context, &camera, k, &states.estimates[k].pose).map(Some)
             } else {
                 Ok(None)

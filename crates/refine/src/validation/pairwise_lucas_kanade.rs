@@ -51,8 +51,8 @@ pub fn align_pairs(
     frame_range: &Range<usize>,
 ) -> Result<Vec<Alignment>, ProblemError> {
     let level = LEVEL.min(finest);
-    let camera = context.camera.at_level(level);
-    let overlaps = Overlaps::of(context, &camera, states, frame_range)?;
+    let cameras = context.cameras.at_level(level);
+    let overlaps = Overlaps::of(context, &cameras, states, frame_range)?;
     let mut alignments = Vec::new();
     for Batch { partners, needed } in overlaps.batches(|_, _| true) {
         let pyramids: BTreeMap<usize, Arc<Pyramid>> = needed
@@ -63,7 +63,7 @@ pub fn align_pairs(
             let image = |k: usize| PosedImage {
                 context,
                 level,
-                camera: camera.with_sweep(&states.sweep(context, k)),
+                camera: cameras.of(k).with_sweep(&states.sweep(context, k)),
                 pyramid: &pyramids[&k],
                 pose: &states.estimates[k].pose,
             };
@@ -103,7 +103,7 @@ mod tests {
 
     #[track_caller]
     fn assert_inconsistent(alignments: &[Alignment], frames: usize, expected: &[usize]) {
-        let found = find_inconsistent_frames(alignments, frames, &RefineOptions::default());
+        let found = find_inconsistent_frames(alignments, &[], frames, &RefineOptions::default());
         let found: Vec<usize> = found.into_iter().map(|(frame, _)| frame).collect();
         assert_eq!(found, expected, "{alignments:#?}");
     }

@@ -154,8 +154,8 @@ fn compare_pairs(
         window_px,
         with_outliers,
     } = comparison;
-    let camera = context.camera.at_level(level);
-    let overlaps = Overlaps::of(context, &camera, states, frame_range)?;
+    let cameras = context.cameras.at_level(level);
+    let overlaps = Overlaps::of(context, &cameras, states, frame_range)?;
     let mut pairs = Vec::new();
     let mut unwrapped_frames: BTreeMap<usize, UnwrappedFrame> = BTreeMap::new();
     for Batch { partners, needed } in overlaps.batches(is_wanted) {

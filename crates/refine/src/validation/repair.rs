@@ -17,7 +17,9 @@ use crate::tracking::track::register_rejected;
 use crate::validation::aliasing::{AliasHypothesis, resolve_aliases, resolve_all_aliases};
 use crate::validation::alignment::Alignment;
 use crate::validation::contradictions::find_contradictions;
-use crate::validation::inconsistent_frames::{find_inconsistent_frames, reject_disagreeing_frames};
+use crate::validation::inconsistent_frames::{
+    find_inconsistent_frames, reject_disagreeing_frames, relation_ties,
+};
 use crate::validation::pairwise_lucas_kanade::align_pairs;
 use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 use std::ops::Range;
@@ -39,9 +41,10 @@ pub fn repair(
     progress: &dyn Progress,
 ) -> Result<Vec<AliasHypothesis>, ProblemError> {
     let count = states.estimates.len();
-    let finest = options.handover_level(context.camera.shorter_side());
+    let finest = options.handover_level(context.cameras.shorter_side());
     progress.start("repair", MAX_ITERATIONS);
     let mut alignments = align_pairs(context, finest, states, &(0..count))?;
+    let ties = relation_ties(context);
     let mut best: Option<FrameStates> = None;
     // Known for the present poses only.
     let mut undecided = None;
@@ -51,7 +54,7 @@ pub fn repair(
                 .iter()
                 .all(|k| states.rejections[*k].is_none())
         });
-        states.reject(find_inconsistent_frames(&alignments, count, options));
+        states.reject(find_inconsistent_frames(&alignments, &ties, count, options));
         let has_changed = !changes(&solved, states).is_empty();
         let is_better = |best: &FrameStates| count_inliers(best) < count_inliers(states);
         if !has_changed && best.as_ref().is_none_or(is_better) {
@@ -99,7 +102,7 @@ fn solve_neighbourhoods(
     states: &mut FrameStates,
     solved: &mut FrameStates,
 ) -> Result<(), ProblemError> {
-    let side = context.camera.shorter_side();
+    let side = context.cameras.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
     let count = states.estimates.len();
     let mut shares = Vec::new();

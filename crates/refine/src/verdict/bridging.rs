@@ -2,8 +2,9 @@
 //!
 //! A run of such frames between two photometric ones is where the prior puts it with both ends
 //! held: a random walk bridges the gap, with the error of the initial steps spread over it; with
-//! independent errors each frame stays at its initial pose. Without photometric frames all keep
-//! their initial poses. No frame that does not know its place moves another, or is moved.
+//! independent errors each frame stays at its initial pose, or where the relation of a rig puts it
+//! from another one of its moment. Without photometric frames all keep their initial poses. No
+//! frame that does not know its place moves another, or is moved.
 
 use crate::linear::normal_equations::{NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
@@ -67,7 +68,7 @@ impl Bridging<'_> {
         let initial = |k: usize| self.datum.to_nominal_tunnel(&self.prior.initial[k]);
         let step = |from: usize, to: usize, estimates: &[FrameEstimate]| {
             let pose = &estimates[from].pose;
-            crate::model::prior::predict(pose, &initial(from), &initial(to))
+            self.prior.predict_at(self.datum, from, pose, to)
         };
         let is_walk = self.prior.jitter.model == JitterModel::RandomWalk;
         if is_walk && gap.start > 0 {
@@ -80,7 +81,11 @@ impl Bridging<'_> {
             }
         } else {
             for k in gap.clone() {
-                estimates[k] = FrameEstimate::at(initial(k));
+                let pose = match self.prior.is_related(k) {
+                    true => step(k - 1, k, estimates),
+                    false => initial(k),
+                };
+                estimates[k] = FrameEstimate::at(pose);
             }
         }
     }
@@ -150,13 +155,14 @@ mod tests {
             times_s: (0..9).map(f64::from).collect(),
             median_step_s: 1.0,
             variance_ratios: vec![1.0; 9],
+            rig: None,
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
         }
     }
 
     fn bridge(prior: &Prior, photometric: [bool; 9]) -> (Vec<Pose>, Vec<Matrix6<f64>>) {
-        let calibration = Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0));
+        let calibration = Calibration::none(Camera::from_vertical_fov(160, 120, 1.0));
         // Photometric frames lie 1 cm more to the side with each step, the others anywhere.
         let mut estimates: Vec<_> = (0..9)
             .map(|k| {

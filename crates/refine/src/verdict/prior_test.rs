@@ -195,14 +195,17 @@ fn errors(
         .iter()
         .map(|pose| datum.to_tunnel(pose))
         .collect();
-    let chosen: Vec<usize> = (0..poses.len()).filter(|k| photometric[*k]).collect();
+    // Of a rig, the noise is that of its first camera.
+    let is_tested = |k: &usize| photometric[*k] && !prior.is_related(*k);
+    let chosen: Vec<usize> = (0..poses.len()).filter(is_tested).collect();
     match prior.jitter.model {
         JitterModel::RandomWalk => {
             let pairs = chosen.iter().filter(|k| **k > 0 && photometric[**k - 1]);
             let of_pair = |&k: &usize| {
                 let (before, own) = (&poses[k - 1], &poses[k]);
-                let initial = [&initial[k - 1], &initial[k]];
-                let (e, ..) = relative_error(initial[0], initial[1], before, own, datum.scale);
+                let (first, start) = prior.first_of_moment(k - 1, before, datum.scale);
+                let initial = [&initial[first], &initial[k]];
+                let (e, ..) = relative_error(initial[0], initial[1], &start, own, datum.scale);
                 let sigma = sigma * prior.steps_between(k - 1, k).sqrt();
                 // The earlier rotation's error in the later camera's axes.
                 let turn = own.r_wc.inverse() * before.r_wc;
@@ -341,6 +344,7 @@ mod tests {
             times_s: (0..COUNT).map(|k| k as f64).collect(),
             median_step_s: 1.0,
             variance_ratios: vec![1.0; COUNT],
+            rig: None,
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
         }
@@ -381,7 +385,7 @@ mod tests {
             next: vec![Matrix6::zeros(); COUNT - 1],
             variance_factor: 1.0,
         };
-        let calibration = Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0));
+        let calibration = Calibration::none(Camera::from_vertical_fov(160, 120, 1.0));
         let datum = calibration.datum(&Kappa::zeros());
         PriorTest::new(
             prior,

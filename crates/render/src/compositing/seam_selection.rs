@@ -232,7 +232,7 @@ impl FrameObserver<'_> {
         walls: &[WallFrame],
     ) -> Vec<NodeObservation> {
         let (thumbnails, placements) = (self.thumbnails, self.placements);
-        let camera = thumbnails.camera();
+        let camera = thumbnails.cameras().of(frame);
         let pose = &placements[frame].pose;
         let view = thumbnails.view(frame, &placements[frame], points);
         let response = self.exposure.of(frame);

@@ -103,7 +103,7 @@ impl FrameReadings {
         let views: Vec<PosedCamera> = seen
             .iter()
             .map(|(frame, _)| PosedCamera {
-                camera: placements[**frame].camera(cache.camera()),
+                camera: placements[**frame].camera(cache.cameras().of(**frame)),
                 pose: &placements[**frame].pose,
             })
             .collect();

@@ -107,13 +107,13 @@ impl TileRenderer<'_> {
             sums,
             best_view,
         } = buffers;
-        let camera = self.frames.camera();
+        let cameras = self.frames.cameras();
         control_points.set(self.surface, self.canvas, tile);
         let views = self.needed(tile).into_iter().filter_map(|frame| {
             let picture = self.frames.picture(frame)?;
             Some(FrameView::new(
                 (frame, &self.placements[frame], picture),
-                camera,
+                cameras.of(frame),
                 self.kernels,
                 self.exposure.of(frame),
                 control_points,

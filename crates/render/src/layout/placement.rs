@@ -1,7 +1,7 @@
 //! Places of the frames on the unrolled wall.
 
 use crate::error::RenderError;
-use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::camera::{Camera, Cameras, Sweep};
 use tunnelstitch_geometry::surface::{Footprint, Surface, viewing_distance};
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
@@ -20,22 +20,23 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// The frames' camera with the motion of this one.
+    /// The frame's camera with its motion.
     pub fn camera(&self, camera: &Camera) -> Camera {
         camera.with_sweep(&self.sweep)
     }
 }
 
-/// Places every frame on the wall, its rows read by `shutter`.
+/// Places every frame on the wall, taken by its camera, its rows read by `shutter`.
 ///
 /// # Errors
 /// [`RenderError::Frame`], for the first frame that has no place.
 pub fn place_frames(
     surface: &dyn Surface,
-    camera: &Camera,
+    cameras: impl Into<Cameras>,
     poses: &[Pose],
     shutter: &Shutter,
 ) -> Result<Vec<Placement>, RenderError> {
+    let cameras = cameras.into();
     poses
         .iter()
         .zip(shutter.sweeps(poses))
@@ -44,7 +45,7 @@ pub fn place_frames(
             Ok(Placement {
                 pose: *pose,
                 sweep,
-                footprint: Footprint::trace(surface, &camera.with_sweep(&sweep), pose)
+                footprint: Footprint::trace(surface, &cameras.of(frame).with_sweep(&sweep), pose)
                     .map_err(|source| RenderError::Frame { frame, source })?,
             })
         })
@@ -58,15 +59,16 @@ pub fn place_frames(
 /// [`RenderError::Frame`] for a camera that stands outside or looks along the axis.
 pub fn native_px_per_metre<'a>(
     surface: &dyn Surface,
-    camera: &Camera,
+    cameras: impl Into<Cameras>,
     poses: impl IntoIterator<Item = &'a Pose>,
 ) -> Result<f64, RenderError> {
-    let focal_px = camera.focal_px();
+    let cameras = cameras.into();
     let mut resolutions = Vec::new();
     for (frame, pose) in poses.into_iter().enumerate() {
+        let camera = cameras.of(frame);
         let distance_m = viewing_distance(surface, camera, pose)
             .map_err(|source| RenderError::Frame { frame, source })?;
-        resolutions.push(focal_px / distance_m);
+        resolutions.push(camera.focal_px() / distance_m);
     }
     resolutions.sort_by(f64::total_cmp);
     match resolutions.get(resolutions.len() / 2) {
@@ -98,7 +100,7 @@ mod tests {
     fn native_resolution_is_focal_length_over_distance() {
         let circle = Circle::new(3.0).unwrap();
         let poses = [facing(Vector3::zeros()), facing(Vector3::y())];
-        let ppm = native_px_per_metre(&circle, &camera(), &poses).unwrap();
+        let ppm = native_px_per_metre(&circle, camera(), &poses).unwrap();
         assert!((ppm - camera().fx / 3.0).abs() < 1e-9);
     }
 
@@ -109,7 +111,7 @@ mod tests {
             facing(Vector3::zeros()),
             facing(Vector3::x() * (-TAU / 4.0)),
         ];
-        let message = place_frames(&circle, &camera(), &poses, &Shutter::default())
+        let message = place_frames(&circle, camera(), &poses, &Shutter::default())
             .unwrap_err()
             .to_string();
         for part in ["frame 1", "vanishing point", "check its pose"] {

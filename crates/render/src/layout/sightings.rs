@@ -3,8 +3,8 @@
 use super::placement::Placement;
 use nalgebra::{Matrix2, Vector2};
 use serde::Serialize;
-use tunnelstitch_core::frames::Mask;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_core::frames::Masks;
+use tunnelstitch_geometry::camera::{Camera, Cameras};
 use tunnelstitch_geometry::surface::{Surface, WallFrame, WallPoint};
 use tunnelstitch_geometry::trajectory::Pose;
 
@@ -47,19 +47,20 @@ pub(crate) fn px_per_metre(camera: &Camera, pose: &Pose, point: &WallFrame) -> O
         .then(|| least_stretch(camera, pose, point))
 }
 
-/// Finds the frames that show `wall`, the one with the highest resolution there first; what `mask`
-/// hides shows nothing.
+/// Finds the frames that show `wall`, the one with the highest resolution there first; what their
+/// `masks` hide shows nothing.
 pub fn sightings(
     surface: &dyn Surface,
-    camera: &Camera,
-    mask: Option<&Mask>,
+    cameras: impl Into<Cameras>,
+    masks: &Masks,
     placements: &[Placement],
     wall: WallPoint,
 ) -> Vec<Sighting> {
-    let point = surface.frame(wall);
+    let (cameras, point) = (cameras.into(), surface.frame(wall));
     let sight = |(frame, placement): (usize, &Placement)| {
         let pose = &placement.pose;
-        let camera = &placement.camera(camera);
+        let camera = &placement.camera(cameras.of(frame));
+        let mask = masks.of(frame);
         let x_c = pose.to_camera(&point.x_w);
         let pixel = camera
             .project(&x_c)
@@ -103,14 +104,14 @@ mod tests {
     }
 
     fn look_at_points(wall: &TestWall, shutter: &Shutter) {
-        let placements = place_frames(&wall.circle, &wall.camera, &wall.poses, shutter).unwrap();
+        let placements = place_frames(&wall.circle, wall.camera, &wall.poses, shutter).unwrap();
         let mut seen = 0;
         for k in 0..40 {
             let point = WallPoint {
                 s_m: wall.perimeter_m() * f64::from(k) / 40.0,
                 h_m: 0.2 + 0.1 * (1.7 * f64::from(k)).sin(),
             };
-            let found = sightings(&wall.circle, &wall.camera, None, &placements, point);
+            let found = sightings(&wall.circle, wall.camera, &Masks::NONE, &placements, point);
             assert!(found.is_sorted_by(|a, b| a.px_per_metre >= b.px_per_metre));
             for sighting in &found {
                 seen += 1;

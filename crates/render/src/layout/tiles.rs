@@ -136,7 +136,7 @@ mod tests {
         let circle = Circle::new(3.0).unwrap();
         let camera = Camera::from_vertical_fov(64, 48, 1.0);
         let poses = spiral(12, 0.5, 30f64.to_radians());
-        let placements = place_frames(&circle, &camera, &poses, &Shutter::default()).unwrap();
+        let placements = place_frames(&circle, camera, &poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&circle, &placements, 40.0).unwrap();
         let bands = tiles(&circle, &canvas, &placements, EDGE);
         let pixels: u32 = bands

@@ -72,7 +72,8 @@ impl Budget {
             let nodes = seam_grid::grid(canvas);
             grid = nodes.pixels() as u64 * Seams::bytes_per_node(format.channels);
             let level = Thumbnails::level(surface, frames, placements, &nodes)?;
-            thumbnails = Thumbnails::bytes(frames.camera(), level, format.channels, frames.len());
+            let size = frames.cameras().size();
+            thumbnails = Thumbnails::bytes(size, level, format.channels, frames.len());
         }
         let rows = BAND_ROWS.min(canvas.rows);
         let pixel = format.pixel_bytes(true) as u64 + 4;

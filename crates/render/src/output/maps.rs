@@ -11,7 +11,7 @@ use tunnelstitch_core::persist::atomic::OutputSet;
 use tunnelstitch_core::raster::{
     CogWriter, Compression, Quantity, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
 };
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{Surface, WallPoint, wall_jacobian};
 
@@ -29,14 +29,14 @@ impl Map {
     /// `labels`: the frames of the grid's nodes; without them, the frame that is finest there.
     pub fn resolution(
         surface: &dyn Surface,
-        camera: &Camera,
+        cameras: &Cameras,
         placements: &[Placement],
         grid: &Canvas,
         labels: Option<&[u32]>,
     ) -> Self {
         Self::of(
             surface,
-            camera,
+            cameras,
             placements,
             grid,
             labels,
@@ -49,7 +49,7 @@ impl Map {
     /// frame's pose and `A = ∂(s, h)/∂ξ` ([`wall_jacobian`]).
     pub fn uncertainty(
         surface: &dyn Surface,
-        camera: &Camera,
+        cameras: &Cameras,
         placements: &[Placement],
         grid: &Canvas,
         labels: Option<&[u32]>,
@@ -64,7 +64,7 @@ impl Map {
             let largest = covariance.symmetric_eigenvalues().max();
             (1e3 * largest.max(0.0).sqrt()) as f32
         };
-        Self::of(surface, camera, placements, grid, labels, sigma_mm)
+        Self::of(surface, cameras, placements, grid, labels, sigma_mm)
     }
 
     /// Maps a property of the wall by its value at a point.
@@ -81,7 +81,7 @@ impl Map {
 
     fn of(
         surface: &dyn Surface,
-        camera: &Camera,
+        cameras: &Cameras,
         placements: &[Placement],
         grid: &Canvas,
         labels: Option<&[u32]>,
@@ -99,7 +99,8 @@ impl Map {
                     let wall = surface.frame(point);
                     let fine = |frame: usize| {
                         let placement = &placements[frame];
-                        px_per_metre(&placement.camera(camera), &placement.pose, &wall)
+                        let camera = placement.camera(cameras.of(frame));
+                        px_per_metre(&camera, &placement.pose, &wall)
                     };
                     let label = labels.map(|labels| labels[node(k)]);
                     let shown = match label {

@@ -12,7 +12,7 @@ use crate::layout::placement::{Placement, native_px_per_metre, place_frames};
 use crate::sampling::picture_cache::{PictureCache, level_for};
 use tunnelstitch_core::frames::FrameSet;
 use tunnelstitch_core::progress::Progress;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
@@ -77,14 +77,15 @@ pub struct LaidOut {
 /// As [`place_frames`], [`native_px_per_metre`] and [`Canvas::covering`].
 pub fn lay_out(
     surface: &dyn Surface,
-    camera: &Camera,
+    cameras: impl Into<Cameras>,
     poses: &[Pose],
     shutter: &Shutter,
     px_per_metre: Option<f64>,
     finer: f64,
 ) -> Result<LaidOut, RenderError> {
-    let placements = place_frames(surface, camera, poses, shutter)?;
-    let native = native_px_per_metre(surface, camera, poses)?;
+    let cameras = cameras.into();
+    let placements = place_frames(surface, &cameras, poses, shutter)?;
+    let native = native_px_per_metre(surface, &cameras, poses)?;
     let px_per_metre = px_per_metre.unwrap_or(finer * native);
     let canvas = Canvas::of_placements(surface, &placements, px_per_metre)?;
     Ok(LaidOut {
@@ -111,7 +112,7 @@ impl<'a> Stitch<'a> {
     /// Everything in [`RenderError`]; no frame is decoded yet.
     pub fn new(
         surface: &'a dyn Surface,
-        camera: &Camera,
+        cameras: impl Into<Cameras>,
         files: &FrameSet,
         poses: &[Pose],
         shutter: &Shutter,
@@ -123,6 +124,7 @@ impl<'a> Stitch<'a> {
                 frames: files.len(),
             });
         }
+        let cameras = cameras.into();
         let moved;
         let poses = if options.ignore_offset {
             moved = on_the_axis(poses);
@@ -135,12 +137,24 @@ impl<'a> Stitch<'a> {
         } else {
             1.0
         };
-        let laid_out = lay_out(surface, camera, poses, shutter, options.px_per_metre, finer)?;
+        let laid_out = lay_out(
+            surface,
+            &cameras,
+            poses,
+            shutter,
+            options.px_per_metre,
+            finer,
+        )?;
         let canvas = &laid_out.canvas;
-        let level = level_for(camera, laid_out.native_px_per_metre, canvas.px_per_metre);
+        let shorter_side = cameras.shorter_side();
+        let level = level_for(
+            shorter_side,
+            laid_out.native_px_per_metre,
+            canvas.px_per_metre,
+        );
         Ok(Self {
             surface,
-            frames: PictureCache::open(files, camera, level)?,
+            frames: PictureCache::open(files, &cameras, level)?,
             laid_out,
             options: *options,
         })
@@ -217,14 +231,14 @@ impl<'a> Stitch<'a> {
 /// Everything in [`RenderError`]; sizes are checked before a frame is read.
 pub fn stitch(
     surface: &dyn Surface,
-    camera: &Camera,
+    cameras: impl Into<Cameras>,
     files: &FrameSet,
     poses: &[Pose],
     shutter: &Shutter,
     options: &StitchOptions,
     progress: &dyn Progress,
 ) -> Result<Panorama, RenderError> {
-    let mut stitch = Stitch::new(surface, camera, files, poses, shutter, options)?;
+    let mut stitch = Stitch::new(surface, cameras, files, poses, shutter, options)?;
     let mut panorama = Panorama::empty(*stitch.canvas(), stitch.frames().format());
     let budget = stitch.budget(panorama.bytes())?;
     let settled = stitch.settle(&budget, progress)?;

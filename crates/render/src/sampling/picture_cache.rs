@@ -5,16 +5,16 @@ use super::pixel_format::PixelFormat;
 use crate::error::RenderError;
 use tunnelstitch_core::frames::{FrameFile, FrameSet, PyramidMask, colour_type, load_colour};
 use tunnelstitch_core::progress::Progress;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
-/// Cache of a survey's frames, all in one format, with the camera that took them.
+/// Cache of a survey's frames, all in one format, with the cameras that took them.
 ///
 /// Frames are decoded by [`PictureCache::load`] and stay until there is no room. A frame that is
 /// decoded again is identical.
 #[derive(Clone, Debug)]
 pub struct PictureCache {
-    camera: Camera,
+    cameras: Cameras,
     format: PixelFormat,
     files: FrameSet,
     /// Width and height of the files' pictures.
@@ -27,13 +27,13 @@ pub struct PictureCache {
 /// Largest share of their pictures' bytes at which files count as compressed.
 const MAX_COMPRESSED_SHARE: f64 = 0.9;
 
-/// Halvings of frames of resolution `native_px_per_metre` before they are coarser than a canvas of
-/// `px_per_metre`: a canvas much coarser than the frames would otherwise pick single pixels out of
-/// them.
-pub fn level_for(camera: &Camera, native_px_per_metre: f64, px_per_metre: f64) -> usize {
+/// Halvings of frames of resolution `native_px_per_metre`, whose shorter side has `side` pixels,
+/// before they are coarser than a canvas of `px_per_metre`: a canvas much coarser than the frames
+/// would otherwise pick single pixels out of them.
+pub fn level_for(side: u32, native_px_per_metre: f64, px_per_metre: f64) -> usize {
     let mut level = 0;
     while native_px_per_metre * 0.5f64.powi(level as i32 + 1) >= px_per_metre
-        && camera.width.min(camera.height) >> (level + 1) >= 16
+        && side >> (level + 1) >= 16
     {
         level += 1;
     }
@@ -46,7 +46,12 @@ impl PictureCache {
     ///
     /// # Errors
     /// A frame that is missing or is no picture; the first in the order of the files.
-    pub fn open(files: &FrameSet, camera: &Camera, level: usize) -> Result<Self, RenderError> {
+    pub fn open(
+        files: &FrameSet,
+        cameras: impl Into<Cameras>,
+        level: usize,
+    ) -> Result<Self, RenderError> {
+        let cameras = cameras.into();
         let formats: Vec<Result<PixelFormat, RenderError>> =
             files.par_map(|file| Ok(PixelFormat::of(colour_type(file)?)));
         let mut format = PixelFormat {
@@ -57,10 +62,10 @@ impl PictureCache {
             format = format.and(found?);
         }
         let mut cache = Self {
-            camera: camera.at_level(level),
+            full_size: cameras.size(),
+            cameras: cameras.at_level(level),
             format,
             files: files.clone(),
-            full_size: [camera.width, camera.height],
             level,
             compressed: false,
             pictures: vec![None; files.len()],
@@ -82,26 +87,27 @@ impl PictureCache {
         files as f64 <= MAX_COMPRESSED_SHARE * pictures as f64
     }
 
-    /// Wraps frames that are in memory already, with the camera that took them.
+    /// Wraps frames that are in memory already, with the cameras that took them.
     ///
     /// # Panics
     /// If a picture is not as large as the camera's.
-    pub fn from_pictures(camera: Camera, pictures: Vec<Picture>) -> Self {
+    pub fn from_pictures(cameras: impl Into<Cameras>, pictures: Vec<Picture>) -> Self {
+        let cameras = cameras.into();
         let mut format = PixelFormat {
             channels: 1,
             deep: false,
         };
         for picture in &pictures {
-            let size = (picture.width() as u32, picture.height() as u32);
-            assert_eq!(size, (camera.width, camera.height), "size of a frame");
+            let size = [picture.width() as u32, picture.height() as u32];
+            assert_eq!(size, cameras.size(), "size of a frame");
             format = format.and(picture.format());
         }
         let widened = pictures.into_iter().map(|p| Some(p.widened(format)));
         Self {
-            camera,
+            full_size: cameras.size(),
+            cameras,
             format,
             files: FrameSet::default(),
-            full_size: [camera.width, camera.height],
             level: 0,
             compressed: false,
             pictures: widened.collect(),
@@ -169,7 +175,7 @@ impl PictureCache {
         }
         let [width, height] = self.full_size;
         let decoded = load_colour(&self.files[frame], width, height)?;
-        let mask = self.files.mask().cloned().map(PyramidMask::new);
+        let mask = self.files.masks().of(frame).cloned().map(PyramidMask::new);
         let mut picture = Picture::from_decoded(decoded)
             .widened(self.format)
             .masked(mask);
@@ -206,9 +212,9 @@ impl PictureCache {
         Ok(())
     }
 
-    /// Camera of the pictures in memory (halved as they are).
-    pub fn camera(&self) -> &Camera {
-        &self.camera
+    /// Cameras of the pictures in memory (halved as they are).
+    pub fn cameras(&self) -> &Cameras {
+        &self.cameras
     }
 
     /// Picture of a frame, if it is in memory.
@@ -245,14 +251,15 @@ impl PictureCache {
 
     /// Memory of one frame, bytes.
     pub fn frame_bytes(&self) -> u64 {
-        let pixels = u64::from(self.camera.width) * u64::from(self.camera.height);
-        pixels * self.format.pixel_bytes(false) as u64
+        let [width, height] = self.cameras.size().map(u64::from);
+        width * height * self.format.pixel_bytes(false) as u64
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tunnelstitch_geometry::camera::Camera;
 
     #[test]
     fn frames_are_halved_only_for_coarse_canvases() {
@@ -265,7 +272,7 @@ mod tests {
             (50.0, 2),
             (0.1, 4),
         ] {
-            assert_eq!(level_for(&camera, 200.0, px_per_metre), level);
+            assert_eq!(level_for(camera.shorter_side(), 200.0, px_per_metre), level);
         }
     }
 
@@ -294,7 +301,7 @@ mod tests {
             })
             .collect();
         let camera = Camera::from_vertical_fov(16, 16, 1.0);
-        let mut cache = PictureCache::open(&files.into(), &camera, 0).unwrap();
+        let mut cache = PictureCache::open(&files.into(), camera, 0).unwrap();
         let held = |cache: &PictureCache| -> Vec<usize> {
             (0..4).filter(|k| cache.picture(*k).is_some()).collect()
         };
@@ -320,7 +327,7 @@ mod tests {
             let path = folder.path().join(name);
             image::GrayImage::new(64, 64).save(&path).unwrap();
             let files = vec![FrameFile::picture(0, path)].into();
-            let cache = PictureCache::open(&files, &camera, 0).unwrap();
+            let cache = PictureCache::open(&files, camera, 0).unwrap();
             assert_eq!(cache.is_compressed(), compressed, "{name}");
         }
     }

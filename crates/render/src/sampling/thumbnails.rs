@@ -9,7 +9,7 @@ use crate::layout::canvas::Canvas;
 use crate::layout::placement::{Placement, native_px_per_metre};
 use crate::warp::projection::{LocalPoints, LocalProjection};
 use tunnelstitch_core::progress::Progress;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::kernel::{Interpolation, Kernel};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
@@ -17,7 +17,7 @@ use tunnelstitch_geometry::surface::Surface;
 /// Small 16-bit pictures of all frames.
 #[derive(Clone, Debug)]
 pub struct Thumbnails {
-    camera: Camera,
+    cameras: Cameras,
     full_size: (usize, usize),
     scale: f32,
     pictures: Vec<Picture>,
@@ -47,10 +47,10 @@ impl Thumbnails {
             Ok(small)
         });
         progress.finish();
-        let camera = frames.camera();
+        let cameras = frames.cameras();
         Ok(Self {
-            camera: camera.at_level(level),
-            full_size: (camera.width as usize, camera.height as usize),
+            cameras: cameras.at_level(level),
+            full_size: cameras.size().map(|side| side as usize).into(),
             scale: (1 << level) as f32,
             bilinear: Kernel::new(Interpolation::Bilinear, 1.0),
             pictures: pictures.into_iter().collect::<Result<Vec<_>, _>>()?,
@@ -67,19 +67,18 @@ impl Thumbnails {
         placements: &[Placement],
         grid: &Canvas,
     ) -> Result<usize, RenderError> {
-        let camera = frames.camera();
+        let cameras = frames.cameras();
         let poses = placements.iter().map(|placement| &placement.pose);
-        let native = native_px_per_metre(surface, camera, poses)?;
-        let most = camera.shorter_side().max(16).ilog2() - 4;
+        let native = native_px_per_metre(surface, cameras, poses)?;
+        let most = cameras.shorter_side().max(16).ilog2() - 4;
         let level = (native / grid.px_per_metre).log2().round();
         Ok(level.clamp(0.0, f64::from(most)) as usize)
     }
 
-    /// Memory of the thumbnails of `frames` frames of the given camera, bytes.
-    pub fn bytes(camera: &Camera, level: usize, channels: usize, frames: usize) -> u64 {
-        let small = camera.at_level(level);
-        let pixels = u64::from(small.width) * u64::from(small.height);
-        2 * pixels * (channels * frames) as u64
+    /// Memory of the thumbnails of `frames` frames of the given size, pixels; bytes.
+    pub fn bytes(size: [u32; 2], level: usize, channels: usize, frames: usize) -> u64 {
+        let [width, height] = size.map(|side| u64::from(side >> level));
+        2 * width * height * (channels * frames) as u64
     }
 
     /// Samples a pixel: 1 or 3.
@@ -87,9 +86,9 @@ impl Thumbnails {
         self.pictures.first().map_or(1, |p| p.format().channels)
     }
 
-    /// The camera of the thumbnails.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
+    /// The cameras of the thumbnails.
+    pub fn cameras(&self) -> &Cameras {
+        &self.cameras
     }
 
     /// Width and height of the frames, pixels.
@@ -125,7 +124,7 @@ impl Thumbnails {
     ) -> ThumbnailView<'a> {
         ThumbnailView {
             projection: LocalProjection::new(
-                &placement.camera(&self.camera),
+                &placement.camera(self.cameras.of(frame)),
                 &placement.pose,
                 &points.origin,
             ),

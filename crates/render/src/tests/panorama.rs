@@ -33,7 +33,7 @@ const BEST: RenderOptions = RenderOptions {
 
 fn draw(wall: &TestWall, mut cache: PictureCache, ppm: f64, options: &RenderOptions) -> Panorama {
     let placements =
-        place_frames(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
+        place_frames(&wall.circle, wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, ppm).unwrap();
     let progress = &Silent;
     render(
@@ -234,7 +234,7 @@ fn raw_pixels_are_those_of_the_frames() {
     });
     let frames = cache.clone();
     let placements =
-        place_frames(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
+        place_frames(&wall.circle, wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, 70.0).unwrap();
     let options = RenderOptions {
         interpolation: Interpolation::Nearest,
@@ -396,10 +396,10 @@ fn little_memory_changes_nothing_but_the_time() {
         .collect();
     let files = FrameSet::from(files);
     let placements =
-        place_frames(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
+        place_frames(&wall.circle, wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, 700.0).unwrap();
     let draw = |room| {
-        let mut frames = PictureCache::open(&files, &wall.camera, 0).unwrap();
+        let mut frames = PictureCache::open(&files, wall.camera, 0).unwrap();
         let plan = Plan::new(&wall.circle, &frames, &placements, &canvas, &BEST, &Silent);
         let plan = plan.unwrap();
         let mut panorama = Panorama::empty(canvas, frames.format());

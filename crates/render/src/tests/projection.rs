@@ -42,7 +42,7 @@ fn charts_project_as_cameras_do() {
             ..camera
         };
         let poses = spiral(4, 0.3, 80f64.to_radians());
-        let placements = place_frames(&circle, &still, &poses, &Shutter::default()).unwrap();
+        let placements = place_frames(&circle, still, &poses, &Shutter::default()).unwrap();
         let placement = Placement {
             sweep: camera.sweep,
             ..placements[1]

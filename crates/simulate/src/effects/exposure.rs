@@ -37,7 +37,7 @@ pub(crate) struct Exposures {
 impl Exposures {
     /// The exposures by the options of a survey.
     pub fn new(options: &SimulateOptions) -> Self {
-        let steps = |step| ExposureSteps::new(options.seed, step, options.frames);
+        let steps = |step| ExposureSteps::new(options.seed, step, options.pictures());
         Self {
             seed: options.seed,
             gain_percent: options.gain_percent,

@@ -21,7 +21,7 @@ fn compared() -> &'static Compared {
         let poses = survey.initial_poses();
         let input = CompareInput {
             surface: survey.surface.as_ref(),
-            camera: &survey.camera,
+            cameras: &survey.cameras,
             files: &survey.frames,
             initial: &poses,
             refined: &poses,

@@ -17,7 +17,7 @@ fn address() -> &'static [String; 2] {
         let surface = survey.surface.as_ref();
         let placed = place_frames(
             surface,
-            &survey.camera,
+            &survey.cameras,
             &survey.initial_poses(),
             &survey.shutter(),
         )
@@ -34,7 +34,7 @@ fn address() -> &'static [String; 2] {
             },
             source_frames: Some(SourceFrames {
                 surface: survey.surface,
-                camera: survey.camera,
+                cameras: survey.cameras,
                 frames: survey.frames,
                 placements: vec![("initial".to_owned(), placed)],
             }),

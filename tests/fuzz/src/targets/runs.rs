@@ -13,6 +13,7 @@ use tunnelstitch::trajectory::tum;
 /// Runs both. They fail, or give finite poses and a panorama.
 pub fn run(data: &[u8]) {
     let mut survey = Survey::open(small_survey()).unwrap();
+    let mut camera = *survey.cameras.of(0);
     for change in data.chunks_exact(9) {
         let Some(value) = change[1..].first_chunk().copied().map(f64::from_le_bytes) else {
             return;
@@ -23,18 +24,18 @@ pub fn run(data: &[u8]) {
             0 => pose.t_wc.x = value,
             1 => pose.t_wc.y = value,
             2 => pose.t_wc.z = value,
-            3 => survey.camera.fx = value,
-            4 => survey.camera.fy = value,
-            5 => survey.camera.cx = value,
-            6 => survey.camera.cy = value,
+            3 => camera.fx = value,
+            4 => camera.fy = value,
+            5 => camera.cx = value,
+            6 => camera.cy = value,
             _ => survey.initial[frame].time_s = value,
         }
     }
     let (_folder, initial) = file("poses.tum", tum::format(&survey.initial).as_bytes());
-    let (_folder, camera) = file("camera.json", format_calibration(&survey.camera).as_bytes());
+    let (_folder, camera) = file("camera.json", format_calibration(&camera).as_bytes());
     let opened = Survey::open_with(small_survey(), |file| {
         file.poses.initial = initial.clone();
-        file.camera.file = Some(camera.clone());
+        file.camera.first_mut().file = Some(camera.clone());
     });
     let Ok(survey) = opened else {
         return;
@@ -46,7 +47,7 @@ pub fn run(data: &[u8]) {
     };
     if let Ok(mut stitch) = Stitch::new(
         survey.surface.as_ref(),
-        &survey.camera,
+        &survey.cameras,
         &survey.frames,
         &poses,
         &survey.shutter(),

@@ -12,6 +12,7 @@ const RADIUS_M: f64 = 3.0;
 /// Validates poses in the convention of `given`.
 fn verdict(poses: &[Pose], given: Convention) -> Result<Vec<String>, String> {
     let reading = InterpretedPoses {
+        of_pictures: false,
         given: indexed(poses.iter().copied()),
         convention: given,
         format: PoseFormat::Tum,

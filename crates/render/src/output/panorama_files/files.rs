@@ -16,7 +16,7 @@ use tunnelstitch_core::frames::{PictureFormat, add_picture};
 use tunnelstitch_core::persist::atomic::{OutputSet, WriteError};
 use tunnelstitch_core::persist::checkpoint::Checkpoint;
 use tunnelstitch_core::raster::RasterError;
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::surface::Surface;
 
 /// Files of one panorama that is being drawn.
@@ -104,7 +104,8 @@ impl PanoramaFiles {
 
     /// Adds all files to a set of outputs.
     ///
-    /// `camera` is that of the frames at full size, `covariances` those of their poses, if known.
+    /// `cameras` are those of the frames at full size, `covariances` those of their poses, if
+    /// known.
     ///
     /// # Errors
     /// Whatever the system says.
@@ -113,12 +114,12 @@ impl PanoramaFiles {
         outputs: &mut OutputSet,
         plan: &Plan,
         gaps: &[Gap],
-        camera: &Camera,
+        cameras: &Cameras,
         covariances: Option<&[Matrix6<f64>]>,
         wall: WallProperties,
     ) -> Result<(), RenderError> {
         if let Some(maps) = self.maps {
-            maps.finish(outputs, plan, gaps, camera, covariances, wall)?;
+            maps.finish(outputs, plan, gaps, cameras, covariances, wall)?;
         }
         if let Some(cog) = self.cog {
             cog.finish(outputs)?;

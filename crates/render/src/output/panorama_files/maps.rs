@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use tunnelstitch_core::frames::{PictureFormat, add_picture};
 use tunnelstitch_core::persist::atomic::{OutputSet, WriteError};
 use tunnelstitch_core::raster::{Quantity, RasterError};
-use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::surface::WallPoint;
 
 pub(super) const COVERAGE: &str = "coverage.tif";
@@ -96,7 +96,7 @@ impl MapFiles {
         outputs: &mut OutputSet,
         plan: &Plan,
         gaps: &[Gap],
-        camera: &Camera,
+        cameras: &Cameras,
         covariances: Option<&[Matrix6<f64>]>,
         wall: WallProperties,
     ) -> Result<(), RenderError> {
@@ -105,9 +105,9 @@ impl MapFiles {
         self.frames.finish(outputs)?;
         let grid = plan.grid();
         let labels = plan.seams().map(|seams| seams.labels());
-        let resolution = Map::resolution(surface, camera, placements, &grid, labels);
+        let resolution = Map::resolution(surface, cameras, placements, &grid, labels);
         let uncertainty = covariances.map(|covariances| {
-            Map::uncertainty(surface, camera, placements, &grid, labels, covariances)
+            Map::uncertainty(surface, cameras, placements, &grid, labels, covariances)
         });
         let deformation = |which: usize| {
             let of_wall = |at: &DeformationAt| Map::of_wall(&grid, |wall| at(wall)[which]);
