@@ -31,7 +31,7 @@ pub use interlacing::interlacing_warning;
 pub use jitter::JitterCheck;
 pub use masks::MaskCheck;
 pub use overlap::OverlapCheck;
-pub use pictures::PictureCheck;
+pub use pictures::{PictureCheck, unused_bits_warning};
 pub use poses::PosesCheck;
 pub use result::Check;
 pub use run::check;
