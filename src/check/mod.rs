@@ -23,6 +23,7 @@ mod poses;
 mod result;
 mod run;
 mod statistics;
+mod unused_bits;
 mod warnings;
 
 pub use deformation::DeformationCheck;
@@ -31,7 +32,8 @@ pub use interlacing::interlacing_warning;
 pub use jitter::JitterCheck;
 pub use masks::MaskCheck;
 pub use overlap::OverlapCheck;
-pub use pictures::{PictureCheck, unused_bits_warning};
+pub use pictures::PictureCheck;
 pub use poses::PosesCheck;
 pub use result::Check;
 pub use run::check;
+pub use unused_bits::unused_bits_warning;

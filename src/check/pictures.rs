@@ -1,7 +1,6 @@
 //! Exposure, noise and texture of a dozen frames.
 
 use super::statistics::median_or_zero;
-use super::warnings::unused_bits;
 use crate::frames::{FrameError, FrameFile, GreyImage, StoredFrame, brightest_bits, noise_sigma};
 use crate::survey::Survey;
 use serde::Serialize;
@@ -95,12 +94,6 @@ impl PictureCheck {
         };
         (check, faults)
     }
-}
-
-/// The warning that the frames leave the upper bits of their files of 16 bits empty, if they do.
-pub fn unused_bits_warning(survey: &Survey) -> Option<String> {
-    let size = (survey.camera.width, survey.camera.height);
-    brightest_bits(&survey.frames, size).and_then(unused_bits)
 }
 
 /// The errors of the frames in words; one, if all have the same.

@@ -2,7 +2,7 @@
 
 use super::deformation::DeformationCheck;
 use super::result::Check;
-use crate::frames::UNUSED_UPPER_BITS;
+use super::unused_bits::unused_bits;
 
 /// Smallest overlap of neighbours, share of a frame, without a warning.
 const MIN_OVERLAP: f64 = 0.25;
@@ -93,18 +93,6 @@ fn large_jitter(check: &Check) -> Option<String> {
             jitter.sigma_px,
             percent(jitter.share_of_overlap),
             percent(MAX_JITTER)
-        )
-    })
-}
-
-/// The warning that no frame uses the upper bits of its file; `bits` are those of the brightest
-/// value.
-pub(super) fn unused_bits(bits: u32) -> Option<String> {
-    UNUSED_UPPER_BITS.contains(&bits).then(|| {
-        format!(
-            "the frames have files of 16 bits, but no value of more than {bits} bits: if the \
-             camera delivers {bits} bits, add bits = {bits} under [frames]; otherwise use more \
-             light or a longer exposure"
         )
     })
 }

@@ -58,8 +58,8 @@ pub fn plan_wall(
     })
 }
 
-/// Draws the panorama of `poses`, the first of the job, as textured mesh in `files`, which are added
-/// to a set of outputs; returns its canvas.
+/// Draws the panorama of `poses`, the first of the job, as textured mesh in `files`, which are
+/// added to a set of outputs; returns its canvas.
 ///
 /// # Errors
 /// A frame that cannot be decoded, too little memory, too much wall for one file, and whatever the

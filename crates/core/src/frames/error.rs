@@ -24,7 +24,7 @@ pub enum FrameError {
     NoFrames {
         /// The pattern.
         pattern: String,
-        /// What there is instead.
+        /// The files that there are instead, for the message.
         hint: String,
     },
     /// A frame is unreadable or damaged.

@@ -1,4 +1,4 @@
-//! What a folder holds where a pattern of frames matches nothing.
+//! The content of a folder in which a pattern of frames matches nothing.
 
 use std::collections::BTreeMap;
 use std::path::Path;

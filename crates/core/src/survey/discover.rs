@@ -6,6 +6,7 @@ use super::left_aside::{LeftAside, reason_by_name, reason_of_text};
 use super::picture_group::PictureGroup;
 use super::recorded_parts::{FoundInRecording, RecordedFrames, RecordedParts};
 use super::straight_axis::{AXIS_FILE, FoundAxis};
+use super::walked_folder::WalkedFolder;
 use crate::frames::{FrameError, PictureOrientation, Video};
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -16,8 +17,6 @@ use tunnelstitch_geometry::trajectory::{
     DuplicateTimes, PoseFile, PoseFileOptions, read_poses_with,
 };
 
-/// Levels of folders below the searched one.
-const MAX_DEPTH: usize = 3;
 /// Larger files are not tried as calibrations.
 const MAX_CALIBRATION_BYTES: u64 = 4 << 20;
 /// Larger files are not tried as poses.
@@ -83,9 +82,7 @@ impl Discovery {
     /// # Errors
     /// A folder that cannot be read.
     pub fn of(folder: &Path) -> std::io::Result<Self> {
-        let mut walked = Walked::default();
-        walk(folder, Path::new(""), MAX_DEPTH, &mut walked)?;
-        walked.files.sort();
+        let walked = WalkedFolder::of(folder)?;
         let group = |((parent, extension), files): (&(PathBuf, String), &Vec<&PathBuf>)| {
             PictureGroup::of(folder, parent, extension, files)
         };
@@ -385,41 +382,6 @@ fn read_up_to<T, E: Display>(
     read().map_err(|error| error.to_string())
 }
 
-/// The files below a folder, and what was not searched or cannot be read, with the reasons.
-#[derive(Default)]
-struct Walked {
-    files: Vec<PathBuf>,
-    unsearched: Vec<(PathBuf, String)>,
-}
-
-fn walk(root: &Path, inner: &Path, depth: usize, walked: &mut Walked) -> std::io::Result<()> {
-    for entry in std::fs::read_dir(root.join(inner))? {
-        let entry = entry?;
-        let path = inner.join(entry.file_name());
-        if entry.file_name().to_string_lossy().starts_with('.') {
-            continue;
-        }
-        let kind = match root.join(&path).metadata() {
-            Ok(kind) => kind,
-            Err(error) => {
-                walked.unsearched.push((path, error.to_string()));
-                continue;
-            }
-        };
-        if kind.is_file() {
-            walked.files.push(path);
-        } else if kind.is_dir() && depth > 0 {
-            if let Err(error) = walk(root, &path, depth - 1, walked) {
-                walked.unsearched.push((path, error.to_string()));
-            }
-        } else if kind.is_dir() {
-            let reason = format!("not searched: more than {MAX_DEPTH} folders below");
-            walked.unsearched.push((path, reason));
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -480,6 +442,20 @@ mod tests {
         );
         assert_eq!(found.initial().unwrap().0, Path::new("right.tum"));
         assert!(found.truth().is_none());
+    }
+
+    /// The results of a run that are kept in the folder of the survey.
+    #[test]
+    fn refined_poses_are_no_initial_ones() {
+        let dir = tempfile::tempdir().unwrap();
+        let results = dir.path().join("refined");
+        std::fs::create_dir(&results).unwrap();
+        std::fs::write(results.join("poses.tum"), "0 0 0 0 0 0 0 1\n").unwrap();
+        assert!(Discovery::of(dir.path()).unwrap().initial().is_some());
+        std::fs::write(results.join("refine.json"), "{}").unwrap();
+        let found = Discovery::of(dir.path()).unwrap();
+        assert!(found.initial().is_none());
+        assert_eq!(found.left_aside[0].pattern, "refined");
     }
 
     /// As many poses as frames are there only because one of two was left out.

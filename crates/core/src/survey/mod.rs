@@ -119,6 +119,7 @@ mod straight_axis;
 mod template;
 mod tunnel;
 mod unposed_frames;
+mod walked_folder;
 mod wall_file;
 
 pub use associate::{Associate, TIME_TOLERANCE_S};

@@ -97,7 +97,8 @@ impl PoseReading {
 impl Survey {
     /// The initial poses as given, followed by every other reading that leaves all cameras inside:
     /// other conventions, the reverse order, quaternions that begin with w, other units, poses of
-    /// other frames, a diameter for the radius, pictures that are turned or mirrored, and other focal lengths.
+    /// other frames, a diameter for the radius, pictures that are turned or mirrored, and other
+    /// focal lengths.
     ///
     /// # Errors
     /// The errors of [`Survey::open`], if the file has changed since.

@@ -33,7 +33,7 @@ pub fn read_regular(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 /// Reads a regular text file of at most `max_bytes`.
 ///
 /// # Errors
-/// The errors of [`read_regular`]; a file that is no text of an encoding that [`decode_text`] knows.
+/// The errors of [`read_regular`]; a file that is no text that [`decode_text`] knows.
 pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<String> {
     let bytes = read_regular(path, max_bytes)?;
     decode_text(&bytes)

@@ -6,7 +6,7 @@ use tunnelstitch_core::progress::{JobStage, Progress};
 
 /// Share of a panorama's work that comes before its first band: decoding, exposures, seams.
 /// Measured on 48 frames of 480 × 360 px and 1,000 of 320 × 240 px, at their own resolution.
-const SETTLE_SHARE: f64 = 0.5;
+const SETTLE_SHARE: f64 = 0.6;
 
 /// A job that draws panoramas, or a part of one.
 #[derive(Clone, Copy)]
