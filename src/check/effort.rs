@@ -1,7 +1,7 @@
 //! Time and memory that refining and stitching need.
 
-use crate::refine::RefineOptions;
-use crate::survey::Survey;
+use crate::refine::{RefineOptions, focal_search_registrations};
+use crate::survey::{CalibrationGroup, Survey};
 use serde::Serialize;
 
 /// Processor time per frame that does not depend on its size, seconds. Measured, as
@@ -13,6 +13,9 @@ const TIME_PER_PIXEL_S: f64 = 0.14e-6;
 /// surveys of 320 × 240 px with 1-σ from 5° to 20°; the search is at a resolution of its own, so
 /// that the time does not depend on the size of the frames.
 const TIME_PER_SEARCH_S: f64 = 4e-4;
+/// Processor time of registering a frame on the one before it in the search for a focal length,
+/// beside that of the search volume, seconds. Measured as [`TIME_PER_SEARCH_S`].
+const TIME_PER_REGISTRATION_S: f64 = 0.02;
 /// Time with the wall solved jointly, relative to the time without: between ten and twenty.
 const JOINT_FACTOR: f64 = 15.0;
 /// Memory of a frame's pyramid per pixel, bytes.
@@ -67,7 +70,21 @@ pub fn refine_processor_s(survey: &Survey, options: &RefineOptions) -> f64 {
     let volume_deg3 = survey.prior.search_volume_deg3(radius_m);
     let search_s = TIME_PER_SEARCH_S * volume_deg3;
     let factor = if options.joint { JOINT_FACTOR } else { 1.0 };
-    frames * factor * (TIME_PER_FRAME_S + TIME_PER_PIXEL_S * pixels + search_s)
+    let frames_s = frames * factor * (TIME_PER_FRAME_S + TIME_PER_PIXEL_S * pixels + search_s);
+    let focal_s = focal_registrations(survey, options) * (TIME_PER_REGISTRATION_S + search_s);
+    frames_s + focal_s
+}
+
+/// Number of registrations by which a focal length that is hardly known is searched for.
+fn focal_registrations(survey: &Survey, options: &RefineOptions) -> f64 {
+    let focal = CalibrationGroup::Focal;
+    let section = survey.file.calibrate.clone().unwrap_or_default();
+    let unknowns = options.calibrate.as_ref().unwrap_or(&section.unknowns);
+    let sigma = 0.01 * section.focal_sigma_percent;
+    match unknowns.contains(&focal) {
+        true => focal_search_registrations(sigma, survey.frames.len()) as f64,
+        false => 0.0,
+    }
 }
 
 /// Memory of refine, bytes, beside what the program takes for any survey.

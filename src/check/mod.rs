@@ -23,6 +23,7 @@ mod poses;
 mod result;
 mod run;
 mod statistics;
+mod unused_bits;
 mod warnings;
 
 pub use deformation::DeformationCheck;
@@ -35,3 +36,4 @@ pub use pictures::PictureCheck;
 pub use poses::PosesCheck;
 pub use result::Check;
 pub use run::check;
+pub use unused_bits::unused_bits_warning;

@@ -1,7 +1,7 @@
 //! Exposure, noise and texture of a dozen frames.
 
 use super::statistics::median_or_zero;
-use crate::frames::{FrameFile, GreyImage, StoredFrame, has_sixteen_bits, noise_sigma, used_bits};
+use crate::frames::{FrameError, FrameFile, GreyImage, StoredFrame, brightest_bits, noise_sigma};
 use crate::survey::Survey;
 use serde::Serialize;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -53,30 +53,20 @@ impl PictureCheck {
     /// Decodes a dozen frames and examines start and end of all; also returns the faults.
     pub(super) fn of(survey: &Survey) -> (Self, Vec<String>) {
         let [width, height] = survey.cameras.size();
-        let examined = (survey.frames).par_map(|file| {
-            file.examine(width, height)
-                .err()
-                .map(|error| error.to_string())
-        });
+        let examined = (survey.frames).par_map(|file| file.examine(width, height).err());
         let step = survey.frames.len().div_ceil(MAX_DECODED_FRAMES).max(1);
         let sound = survey.frames.iter().zip(&examined);
         let sound = sound.filter_map(|(file, fault)| fault.is_none().then_some(file));
         let sampled: Vec<&FrameFile> = sound.step_by(step).collect();
-        let mut faults: Vec<String> = examined.into_iter().flatten().collect();
-        if faults.len() > MAX_LISTED_FAULTS {
-            let more = faults.len() - MAX_LISTED_FAULTS;
-            faults.truncate(MAX_LISTED_FAULTS);
-            faults.push(format!("and {more} more frames have such faults"));
-        }
-        let decoded: Vec<Result<(GreyImage, Option<u32>), String>> =
+        let mut faults = faults_in_words(examined);
+        let decoded: Vec<Result<GreyImage, String>> =
             sampled.par_map(|file| match StoredFrame::decode(file, width, height) {
                 Ok(frame) => {
                     let mut grey = frame.grey();
                     if let Some(mask) = survey.frames.masks().of(file.index) {
                         mask.blank(&mut grey);
                     }
-                    let used_bits = used_bits(&frame).filter(|_| has_sixteen_bits(file));
-                    Ok((grey, used_bits))
+                    Ok(grey)
                 }
                 Err(error) => Err(error.to_string()),
             });
@@ -84,17 +74,14 @@ impl PictureCheck {
         let mut pictures = Vec::new();
         for picture in decoded {
             match picture {
-                Ok((picture, used_bits)) => pictures.push(Self {
-                    used_bits,
-                    ..measure(&picture, hidden)
-                }),
+                Ok(picture) => pictures.push(measure(&picture, hidden)),
                 Err(fault) => faults.push(fault),
             }
         }
         let of = |value: fn(&Self) -> f64| median_or_zero(pictures.iter().map(value));
         let check = Self {
             decoded: pictures.len(),
-            used_bits: pictures.iter().filter_map(|p| p.used_bits).max(),
+            used_bits: brightest_bits(&survey.frames, (width, height)),
             grey: of(|p| p.grey),
             clipped: of(|p| p.clipped),
             noise_grey: of(|p| p.noise_grey),
@@ -104,6 +91,24 @@ impl PictureCheck {
         };
         (check, faults)
     }
+}
+
+/// The errors of the frames in words; one, if all have the same.
+fn faults_in_words(errors: Vec<Option<FrameError>>) -> Vec<String> {
+    let count = errors.len();
+    let mut errors: Vec<FrameError> = errors.into_iter().flatten().collect();
+    let reasons: Vec<String> = errors.iter().map(FrameError::reason).collect();
+    let is_of_all = reasons.len() == count && reasons.iter().all(|other| *other == reasons[0]);
+    if is_of_all && count > 0 {
+        return vec![errors.swap_remove(0).of_all(count).to_string()];
+    }
+    let listed = errors.iter().take(MAX_LISTED_FAULTS);
+    let mut faults: Vec<String> = listed.map(ToString::to_string).collect();
+    if errors.len() > MAX_LISTED_FAULTS {
+        let more = errors.len() - MAX_LISTED_FAULTS;
+        faults.push(format!("and {more} more frames have such faults"));
+    }
+    faults
 }
 
 /// Measures an image; the mask hides a share `hidden` of its pixels, whose values are NaN.

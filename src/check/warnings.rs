@@ -2,8 +2,7 @@
 
 use super::deformation::DeformationCheck;
 use super::result::Check;
-use crate::frames::UNUSED_UPPER_BITS;
-use crate::refine::FittingReadings;
+use super::unused_bits::unused_bits;
 
 /// Smallest overlap of neighbours, share of a frame, without a warning.
 const MIN_OVERLAP: f64 = 0.25;
@@ -19,17 +18,31 @@ const MAX_REGISTRATION_SIGMA_PX: f64 = 0.1;
 
 /// Lists the warnings, the most severe first.
 pub(super) fn warnings(check: &Check) -> Vec<String> {
+    let of_poses = match &check.readings {
+        // Poses that are read wrongly tell nothing else.
+        Some(readings) => vec![readings.sentence()],
+        None => of_poses(check),
+    };
+    let of_pictures = [
+        (check.pictures.used_bits)
+            .and_then(unused_bits)
+            .or_else(|| dark_frames(check)),
+        saturated_frames(check),
+        weak_texture(check),
+        uncovered_image(check),
+    ];
+    let of_pictures = of_pictures.into_iter().flatten();
+    of_poses.into_iter().chain(of_pictures).collect()
+}
+
+/// The warnings that follow from the initial poses.
+fn of_poses(check: &Check) -> Vec<String> {
     let all = [
-        check.readings.as_ref().map(FittingReadings::sentence),
         weak_overlap(check),
         frames_without_wall(check),
         open_turns(check),
         large_jitter(check),
-        unused_bits(check).or_else(|| dark_frames(check)),
-        saturated_frames(check),
-        weak_texture(check),
         (check.deformation.as_ref()).and_then(DeformationCheck::warning),
-        uncovered_image(check),
     ];
     all.into_iter().flatten().collect()
 }
@@ -80,18 +93,6 @@ fn large_jitter(check: &Check) -> Option<String> {
             jitter.sigma_px,
             percent(jitter.share_of_overlap),
             percent(MAX_JITTER)
-        )
-    })
-}
-
-fn unused_bits(check: &Check) -> Option<String> {
-    let bits = check.pictures.used_bits?;
-    UNUSED_UPPER_BITS.contains(&bits).then(|| {
-        format!(
-            "the frames have files of 16 bits, but no value of more than {bits} bits (mean grey \
-             level {:.0} of 255): if the camera delivers {bits} bits, add bits = {bits} under \
-             [frames]; otherwise use more light or a longer exposure",
-            check.pictures.grey
         )
     })
 }

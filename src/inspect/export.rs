@@ -7,8 +7,7 @@ use super::marks::{MARKS_CSV, MARKS_GEOJSON};
 use super::tiles_target::{TilesFolder, TilesTarget};
 use super::viewer::Viewer;
 use crate::persist::atomic::{OutputSet, StagedFolder, WriteError};
-use crate::progress::Progress;
-use crate::render::{Canvas, Target};
+use crate::render::{Canvas, PanoramaJob, Target};
 use crate::survey::Survey;
 use crate::trajectory::Pose;
 use std::path::Path;
@@ -59,8 +58,8 @@ pub fn plan_wall(
     })
 }
 
-/// Draws the panorama of `poses` as textured mesh in `files`, which are added to a set of outputs;
-/// returns its canvas.
+/// Draws the panorama of `poses`, the first of the job, as textured mesh in `files`, which are
+/// added to a set of outputs; returns its canvas.
 ///
 /// # Errors
 /// A frame that cannot be decoded, too little memory, too much wall for one file, and whatever the
@@ -71,7 +70,7 @@ pub fn stage_wall(
     options: &TextureOptions,
     files: ExportFiles,
     outputs: &mut OutputSet,
-    progress: &dyn Progress,
+    job: &PanoramaJob,
 ) -> Result<Canvas, InspectError> {
     let surface = survey.surface.as_ref();
     let mut stitch = lay_out_texture(survey, poses, &survey.shutter(), options)?;
@@ -95,9 +94,11 @@ pub fn stage_wall(
             .as_mut()
             .map(|tiles| tiles.target() as &mut dyn Target),
     );
-    let settled = stitch.settle(&budget, progress)?;
+    let progress = job.panorama(0);
+    let settled = stitch.settle(&budget, &progress)?;
     let (plan, frames) = stitch.plan(settled);
-    plan.draw(frames, budget.room, &mut targets, progress)?;
+    plan.draw(frames, budget.room, &mut targets, &progress)?;
+    drop(progress);
     if let Some(single) = single {
         single.finish(outputs)?;
     }
@@ -119,11 +120,11 @@ pub fn stage_page(
     options: &TextureOptions,
     twelve_at_deg: f64,
     (folder, outputs): (&Path, &mut OutputSet),
-    progress: &dyn Progress,
+    job: &PanoramaJob,
 ) -> Result<(), InspectError> {
     let staged = StagedFolder::begin(folder)?;
     let place = staged.path();
-    draw_layers(survey, layers, options, twelve_at_deg, place, progress)?;
+    draw_layers(survey, layers, options, twelve_at_deg, place, job)?;
     Viewer::bundled()?.write(place)?;
     for name in [MARKS_GEOJSON, MARKS_CSV] {
         let old = folder.join(name);

@@ -9,7 +9,9 @@ use super::tiles_target::{TilesTarget, tiles_px_per_metre};
 use crate::evaluate::deformation::{DeviationGrid, DeviationMap};
 use crate::persist::atomic;
 use crate::progress::Progress;
-use crate::render::{RenderError, RenderOptions, Stitch, StitchOptions, Target, place_frames};
+use crate::render::{
+    PanoramaJob, RenderError, RenderOptions, Stitch, StitchOptions, Target, place_frames,
+};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, Shutter};
 use serde::Serialize;
@@ -90,7 +92,8 @@ pub fn plan_layers(
     Ok(most_bytes)
 }
 
-/// Draws all layers into `folder` and writes the manifest beside them.
+/// Draws all layers into `folder`, each a panorama of the job, and writes the manifest beside
+/// them.
 ///
 /// # Errors
 /// A frame that cannot be decoded; whatever the system says.
@@ -100,23 +103,24 @@ pub fn draw_layers(
     options: &TextureOptions,
     twelve_at_deg: f64,
     folder: &Path,
-    progress: &dyn Progress,
+    job: &PanoramaJob,
 ) -> Result<(), InspectError> {
     let map = DeviationMap::of_survey(survey)?;
     let mut deformation = map
         .as_ref()
         .and_then(|map| Some((map, DeviationGrid::new(map)?)));
     let mut drawn = Vec::new();
-    for layer in layers {
+    for (k, layer) in layers.iter().enumerate() {
         // The deformation is painted over the first panorama.
         let deformation = deformation.take();
+        let progress = job.panorama(k);
         drawn.extend(draw_layer(
             survey,
             layer,
             deformation,
             options,
             folder,
-            progress,
+            &progress,
         )?);
     }
     let surface = survey.surface.as_ref();

@@ -309,10 +309,10 @@ const ROWS: &[Row] = &[
     (Write(CAMERA, b""), REFINE, 3, &["camera.json:1:"]),
     (Halve(CAMERA), REFINE, 3, &["camera.json:", "EOF"]),
     (
-        Write(CAMERA, b"\xff\xd8\xff"),
+        Write(CAMERA, b"\xff\xd8\xff\xe0\0\x10JFIF"),
         REFINE,
         3,
-        &["camera.json", "not a text file"],
+        &["camera.json", "no text of UTF-8"],
     ),
     (
         Edit(CAMERA, "\"fx\"", "\"gx\""),
@@ -407,7 +407,7 @@ const ROWS: &[Row] = &[
     (
         WriteAndEdit(
             "c.txt",
-            b"1 PINHOLE 480 360 1 1 1 1\n2 PINHOLE 480 360 1 1 1 1\n",
+            b"1 PINHOLE 480 360 1 1 1 1\n2 PINHOLE 480 360 1 1 1 2\n",
             TOML,
             "camera.json",
             "c.txt",

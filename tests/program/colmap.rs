@@ -144,3 +144,39 @@ fn a_model_of_some_frames_is_completed() {
         "{message}"
     );
 }
+
+/// COLMAP writes a camera for each picture unless it is told to share one: equal ones are one, and
+/// of others `init` selects one by name.
+#[test]
+fn a_camera_for_each_picture_is_shared_or_selected() {
+    let survey = survey_of_colmap(14);
+    let dir = survey.path();
+    let cameras = dir.join("sparse/0/cameras.txt");
+    let written = std::fs::read_to_string(&cameras).unwrap();
+    let line = written.lines().find(|line| line.starts_with("1 ")).unwrap();
+    let second = line.replacen("1 ", "2 ", 1);
+    std::fs::write(&cameras, format!("{line}\n{second}\n")).unwrap();
+    std::fs::remove_file(dir.join("camera.json")).unwrap();
+    let init = [
+        "init",
+        text(dir),
+        "--radius-m",
+        "3",
+        "--unit-m",
+        "1",
+        "--force",
+    ];
+    let said = succeed(&init);
+    assert!(
+        said.contains("next: ") && !said.contains("name under"),
+        "{said}"
+    );
+    let focal = line.split(' ').nth(4).unwrap();
+    let second = second.replacen(focal, "431.5", 1);
+    std::fs::write(&cameras, format!("{line}\n{second}\n")).unwrap();
+    let said = succeed(&init);
+    assert!(said.contains("camera 1 of 2 that differ"), "{said}");
+    let toml = std::fs::read_to_string(dir.join("survey.toml")).unwrap();
+    assert!(toml.contains("\nname = \"1\""), "{toml}");
+    succeed(&["check", text(dir)]);
+}

@@ -132,3 +132,41 @@ fn what_is_left_aside_is_named_with_the_reason() {
         .unwrap();
     assert_eq!(npy["count"], 2, "{report}");
 }
+
+/// Folders named as no pattern should be, poses of converted frames on another system, and a folder
+/// without poses.
+#[test]
+fn names_that_people_give_are_found_again() {
+    let survey = first_frames(4);
+    let dir = survey.path();
+    let poses = std::fs::read_to_string(dir.join("baseline.tum")).unwrap();
+    for name in ["survey.toml", "baseline.tum", "groundtruth.tum"] {
+        std::fs::remove_file(dir.join(name)).unwrap();
+    }
+    std::fs::rename(dir.join("frames"), dir.join("photos [1]")).unwrap();
+    let said = init(dir, &["--radius-m", "3"]);
+    assert!(said.contains("initial poses   none found"), "{said}");
+    assert!(said.contains("let tunnelstitch plan"), "{said}");
+    let row = |(k, line): (usize, &str)| {
+        let words: Vec<String> = line
+            .split(' ')
+            .skip(1)
+            .map(|w| w.replace('.', ","))
+            .collect();
+        format!("C:\\Röhre\\{k:06}.PNG;{}\r\n", words.join(";"))
+    };
+    let rows: String = poses.lines().enumerate().map(row).collect();
+    let table = format!("Image;x;y;z;qx;qy;qz;qw\r\n{rows}");
+    // As a German spreadsheet saves it: ö is one byte.
+    let bytes: Vec<u8> = table
+        .chars()
+        .map(|c| u8::try_from(u32::from(c)).unwrap())
+        .collect();
+    std::fs::write(dir.join("Posen.csv"), bytes).unwrap();
+    let said = init(dir, &["--radius-m", "3", "--force"]);
+    assert!(
+        said.contains("next: ") && !said.contains("warning"),
+        "{said}"
+    );
+    assert!(said.contains("photos [[]1[]]/*.jpg (4, "), "{said}");
+}

@@ -567,6 +567,11 @@ fn what_only_pictures_can_tell_is_named_by_check() {
     write_tum(&path, mapped(&planned, in_millimetres));
     assert_named("unit_m = 0.001", "[poses]");
     write_tum(&path, planned);
+    // A diameter is given for the radius.
+    edit(&toml, "radius_m = 3.0", "radius_m = 6.0");
+    let said = check();
+    assert!(said.contains("radius_m = 3 under [tunnel]"), "{said}");
+    std::fs::write(&toml, &right).unwrap();
     for entry in std::fs::read_dir(dir.join("frames")).unwrap() {
         let path = entry.unwrap().path();
         image::open(&path).unwrap().rotate180().save(&path).unwrap();

@@ -99,6 +99,7 @@ pub use report::{
 };
 pub use solver::solve_record::{SolveRecord, StepRecord};
 pub use solver::stopping::StopReason;
+pub use tracking::focal_search::focal_search_registrations;
 pub use uncertainty::calibration_report::{CalibrationReport, UnknownReport};
 pub use uncertainty::covariance::Covariances;
 pub use uncertainty::covariance_file::{CovarianceError, read_covariances};

@@ -73,6 +73,7 @@ pub use output::panorama::Panorama;
 pub use output::panorama_files::{
     CheckpointedFiles, DeformationAt, MaskedAt, PanoramaFileOptions, PanoramaFiles, WallProperties,
 };
+pub use output::panorama_progress::{PanoramaJob, PanoramaProgress};
 pub use output::plan::{Plan, Settled};
 pub use output::preview::Preview;
 pub use output::raster_target::{Kept, RasterLayer, RasterState, RasterTarget};

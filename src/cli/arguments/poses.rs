@@ -29,6 +29,9 @@ pub struct PoseReadingArguments {
     /// names it, or xyzw].
     #[arg(long, value_enum, value_name = "ORDER")]
     pose_quaternion: Option<QuaternionArgument>,
+    /// Topic of the poses, if they are in a recording that has several.
+    #[arg(long, value_name = "TOPIC")]
+    pose_topic: Option<String>,
     /// Direction of the poses: camera to world (c2w) or world to camera (w2c)
     /// [default: that of the format].
     #[arg(long, value_enum, value_name = "C2W|W2C")]
@@ -61,6 +64,13 @@ pub struct PoseReadingArguments {
     /// taking the nearer one.
     #[arg(long)]
     interpolate: bool,
+    /// Topic of the frames, if they are in a recording that has several with images.
+    #[arg(
+        long,
+        value_name = "TOPIC",
+        help_heading = "Reading frames (overrides survey.toml)"
+    )]
+    frame_topic: Option<String>,
     /// Leave out frames whose files cannot be read (missing, damaged, or not of the calibration's
     /// size), with a warning that names them, instead of failing. All frames are decoded once more
     /// for it. What `refine` has made so is read so by other commands.
@@ -242,6 +252,7 @@ impl PoseReadingArguments {
         let poses = &mut file.poses;
         replace(&mut poses.format, self.pose_format.map(Into::into));
         poses.columns.extend(self.pose_columns.iter().cloned());
+        replace(&mut poses.topic, self.pose_topic.clone());
         replace(&mut poses.quaternion, self.pose_quaternion.map(Into::into));
         replace(&mut poses.convention, self.pose_convention.map(Into::into));
         replace(&mut poses.camera_axes, self.camera_axes.map(Into::into));
@@ -260,6 +271,7 @@ impl PoseReadingArguments {
             &mut file.frames.times,
             self.frame_times.as_deref().map(absolute),
         );
+        replace(&mut file.frames.topic, self.frame_topic.clone());
         replace(&mut file.frames.skip_bad, self.skip_bad.then_some(true));
     }
 }

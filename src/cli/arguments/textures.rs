@@ -90,6 +90,15 @@ impl LayerName {
 }
 
 impl LayerArguments {
+    /// Number of layers that [`LayerArguments::select`] selects.
+    pub fn count(&self, path: &Path, poses: &PosesArguments) -> usize {
+        let has_truth = || Survey::read_file(path).is_ok_and(|file| file.poses.truth.is_some());
+        self.layers.as_ref().map_or_else(
+            || 1 + usize::from(poses.file().is_some()) + usize::from(has_truth()),
+            Vec::len,
+        )
+    }
+
     /// Selects the layers of the survey at `path`, which has been opened with `poses`; the refined
     /// poses come first unless --layers orders them.
     ///

@@ -10,7 +10,7 @@ use crate::inspect::{
     stage_wall,
 };
 use crate::persist::atomic::OutputSet;
-use crate::render::Canvas;
+use crate::render::{Canvas, PanoramaJob};
 use crate::survey::Survey;
 use crate::trajectory::{Trajectory, poses_of};
 use serde::Serialize;
@@ -90,7 +90,9 @@ pub fn run(
     let inputs = record::hash_survey(&survey, arguments.poses.file())?;
     let files = arguments.files();
     let mut outputs = OutputSet::default();
-    let canvas = if files.glb.is_some() || files.tiles.is_some() {
+    let has_wall = files.glb.is_some() || files.tiles.is_some();
+    let job = PanoramaJob::new(terminal, usize::from(has_wall) + arguments.count_layers());
+    let canvas = if has_wall {
         let (poses, options) = (poses_of(&trajectory), arguments.textures.options());
         Some(stage_wall(
             &survey,
@@ -98,7 +100,7 @@ pub fn run(
             &options,
             files,
             &mut outputs,
-            terminal,
+            &job,
         )?)
     } else {
         None
@@ -106,7 +108,8 @@ pub fn run(
     let layers = match &arguments.web {
         Some(folder) => {
             let page = (folder.as_path(), &mut outputs);
-            add_page(arguments, page, (survey, trajectory), terminal)?
+            let job = job.after(usize::from(has_wall));
+            add_page(arguments, page, (survey, trajectory), &job)?
         }
         None => Vec::new(),
     };
@@ -137,6 +140,12 @@ impl ExportArguments {
             glb: self.glb.as_deref(),
             tiles: self.tiles.as_deref(),
         }
+    }
+
+    /// Number of layers of the page, if there is one.
+    fn count_layers(&self) -> usize {
+        let layers = self.web.as_ref().map(|_| &self.layers);
+        layers.map_or(0, |layers| layers.count(&self.survey, &self.poses))
     }
 
     /// Paths of the records of the run.
@@ -239,19 +248,12 @@ fn add_page(
     arguments: &ExportArguments,
     page: (&Path, &mut OutputSet),
     opened: (Survey, Trajectory),
-    terminal: &Terminal,
+    job: &PanoramaJob,
 ) -> Result<Vec<LayerName>, Failure> {
     let layers = &arguments.layers;
     let (survey, selected) = layers.select(&arguments.survey, &arguments.poses, opened)?;
     let (names, posed): (Vec<_>, Vec<_>) = selected.into_iter().unzip();
     let options = arguments.textures.options();
-    stage_page(
-        &survey,
-        &posed,
-        &options,
-        layers.twelve_at_deg,
-        page,
-        terminal,
-    )?;
+    stage_page(&survey, &posed, &options, layers.twelve_at_deg, page, job)?;
     Ok(names)
 }

@@ -6,7 +6,7 @@ use crate::cli::output::{Failure, Terminal};
 use crate::files::printed;
 use crate::persist::atomic;
 use crate::survey::{AXIS_FILE, Discovery, LeftAside, SURVEY_FILE, Survey, SurveyError};
-use crate::trajectory::TunnelAxis;
+use crate::trajectory::{PoseError, TunnelAxis};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -86,7 +86,7 @@ fn report<'a>(path: &'a Path, found: &'a Discovery, missing: Option<String>) -> 
         video: found.video.as_ref().map(|video| video.path.as_path()),
         recording: found.recorded.as_ref().map(|(path, _)| path.as_path()),
         mask: found.mask.as_deref(),
-        calibration: found.calibrations.first().map(|(path, _)| path.as_path()),
+        calibration: found.calibrations.first().map(|found| found.path.as_path()),
         initial_poses: found.initial().map(|(path, _)| path.as_path()),
         true_poses: found.truth().map(|(path, _)| path.as_path()),
         tunnel_axis: found.axis.as_ref().map(|found| &found.axis),
@@ -136,6 +136,11 @@ fn unknown_scale(found: &Discovery) -> Option<String> {
 /// scale of their positions is unknown.
 fn missing(found: &Discovery, error: &SurveyError) -> String {
     match error {
+        SurveyError::Poses(PoseError::Read { .. }) if found.initial().is_none() => {
+            "there are no poses; let tunnelstitch plan or tunnelstitch gyro make them, or name a \
+             file by initial = \"…\" under [poses]"
+                .to_owned()
+        }
         SurveyError::Placement { .. } if found.axis.is_some() && found.lacks_scale() => {
             "cameras are outside of the tunnel if a unit of the poses is 1 m; give the metres of a \
              unit by --unit-m"

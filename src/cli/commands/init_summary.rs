@@ -1,9 +1,10 @@
 //! The summary of `tunnelstitch init`: what it took of a folder and what it left aside, and why.
 
-use crate::camera::Camera;
 use crate::files::printed;
 use crate::frames::PictureOrientation;
-use crate::survey::{AXIS_FILE, Discovery, FoundAxis, LeftAside, PictureGroup};
+use crate::survey::{
+    AXIS_FILE, Discovery, FoundAxis, FoundCalibration, LeftAside, PictureGroup, SelectedCamera,
+};
 use crate::trajectory::PoseFile;
 use std::path::{Path, PathBuf};
 
@@ -111,10 +112,14 @@ fn calibrations(found: &Discovery) -> Vec<String> {
         let text = "none: a pinhole is guessed, and refine searches for its focal length";
         return vec![row("calibration", text)];
     }
-    let size = |k: usize| found.calibrations.get(k).map(|(_, c)| (c.width, c.height));
-    let line = |(k, (path, camera)): (usize, &(PathBuf, Camera))| {
-        let (width, height) = (camera.width, camera.height);
-        let text = format!("{} ({width} × {height} px)", printed(path));
+    let size = |k: usize| found.calibrations.get(k).map(FoundCalibration::size);
+    let line = |(k, found): (usize, &FoundCalibration)| {
+        let (width, height) = found.size();
+        let selected = found.selected.as_ref().map_or(String::new(), |selected| {
+            let SelectedCamera { name, of } = selected;
+            format!("; camera {name} of {of} that differ: name under [camera] selects another")
+        });
+        let text = format!("{} ({width} × {height} px{selected})", printed(&found.path));
         match k {
             0 => row("calibration", text),
             _ if size(k) == size(0) => row("another", format!("{text}: one is enough")),
@@ -129,6 +134,18 @@ fn calibrations(found: &Discovery) -> Vec<String> {
 
 /// The initial and the true poses, then others.
 fn poses(found: &Discovery) -> Vec<String> {
+    if found.initial().is_none() {
+        let text = "none found: tunnelstitch plan makes them from a plan, tunnelstitch gyro from a \
+                    log of a gyro";
+        let mut lines = vec![row("initial poses", text)];
+        lines.extend(
+            found
+                .poses
+                .iter()
+                .map(|(path, _)| row("true poses", printed(path).to_string())),
+        );
+        return lines;
+    }
     let is_same = |other: Option<&(PathBuf, _)>, path: &Path| other.is_some_and(|(p, _)| p == path);
     let (frames, _) = found.frames();
     let line = |(path, poses): &(PathBuf, PoseFile)| {

@@ -1,6 +1,6 @@
 //! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
 
-use crate::check::{refine_bytes, refine_s};
+use crate::check::{refine_bytes, refine_s, unused_bits_warning};
 use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::commands::refine_files::{
@@ -198,6 +198,9 @@ pub fn run(
     check_memory(&survey)?;
     if arguments.dry_run.is_set() {
         return describe(&survey, &options, &arguments.out)?.print(terminal);
+    }
+    if let Some(warning) = unused_bits_warning(&survey) {
+        terminal.warn(warning);
     }
     let inputs = record::hash_survey(&survey, None)?;
     let origin = resume::origin(&survey, &options, inputs.clone())?;

@@ -15,7 +15,7 @@ use crate::progress::Progress;
 use crate::refine::read_covariances;
 use crate::render::{
     Budget, CheckpointedFiles, DeformationAt, FrameExposure, Gap, Layout, MaskedAt, PanoramaFiles,
-    Plan, RenderOptions, Stitch, StitchOptions, WallProperties,
+    PanoramaJob, Plan, RenderOptions, Stitch, StitchOptions, WallProperties,
 };
 use crate::surface::WallPoint;
 use crate::survey::{MaskedWall, Survey};
@@ -216,10 +216,11 @@ impl StitchRun<'_> {
         let mut files = output
             .options()
             .begin(&canvas, format, self.layout, checkpoint)?;
+        let progress = PanoramaJob::new(terminal, 1).panorama(0);
         let settled = match checkpoint.state(SETTLED)? {
             Some(settled) => settled,
             None => {
-                let settled = stitch.settle(&budget, terminal)?;
+                let settled = stitch.settle(&budget, &progress)?;
                 checkpoint.keep(SETTLED, &settled)?;
                 settled
             }
@@ -235,8 +236,9 @@ impl StitchRun<'_> {
             frames,
             budget.room,
             &mut [&mut target],
-            terminal,
+            &progress,
         )?;
+        drop(progress);
         let coverage = files.coverage();
         if coverage == 0.0 {
             return Err(Failure::input(

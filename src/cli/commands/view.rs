@@ -8,6 +8,7 @@ use crate::inspect::{
     MANIFEST, Marks, Server, ServerContent, Viewer, draw_layers, pose_source_frames,
 };
 use crate::persist::atomic::ScratchFolder;
+use crate::render::PanoramaJob;
 use crate::report::REFINEMENT_FILE;
 use crate::survey::SURVEY_FILE;
 use serde::Serialize;
@@ -83,7 +84,7 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
         &arguments.textures.options(),
         arguments.layers.twelve_at_deg,
         scratch.path(),
-        terminal,
+        &PanoramaJob::new(terminal, layers.len()),
     )?;
     let served = ServerContent {
         folder: scratch.path().to_owned(),

@@ -98,12 +98,12 @@ impl FrameFile {
 
     /// The decoder of a picture file in a recording after reading its header.
     fn content_header(&self, content: &Content) -> Result<impl ImageDecoder, FrameError> {
-        decoder(content.input()).map_err(|error| self.decode_error(error.to_string()))
+        decoder(content.input()).map_err(|error| self.picture_error(&error))
     }
 
     /// The decoder of a picture file after reading its header.
     fn header(&self) -> Result<impl ImageDecoder, FrameError> {
-        open_picture(&self.path).map_err(|error| self.decode_error(error.to_string()))
+        open_picture(&self.path).map_err(|error| self.picture_error(&error))
     }
 }
 
@@ -177,12 +177,12 @@ fn decode_file(
     {
         return Ok(picture);
     }
-    let mut decoder = decoder(content.input()).map_err(|error| fail(error.to_string()))?;
+    let refuse = |error| file.picture_error(&error);
+    let mut decoder = decoder(content.input()).map_err(refuse)?;
     let turn = reading.orientation.turn(orientation(&mut decoder));
     // Checked before allocating the memory that the header claims.
     check(turned_size(decoder.dimensions(), turn))?;
-    let mut picture =
-        DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))?;
+    let mut picture = DynamicImage::from_decoder(decoder).map_err(refuse)?;
     picture.apply_orientation(turn);
     reading.scale(picture).map_err(fail)
 }

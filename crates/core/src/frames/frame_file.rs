@@ -3,21 +3,15 @@
 use super::error::FrameError;
 use super::picture_reading::PictureReading;
 use super::recorded_images::RecordedImages;
+use super::unmatched_pattern;
 use super::unread_format::UnreadFormat;
 use super::video::Video;
 use alphanumeric_sort::compare_path;
-use image::DynamicImage;
+use image::error::ImageFormatHint;
+use image::{DynamicImage, ImageError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::files::printed;
-
-/// The remedy for a picture file that cannot be read.
-const RESTORE_OR_SKIP: &str = "restore the file, or leave out what cannot be read by --skip-bad \
-                               (skip_bad = true under [frames])";
-
-/// The remedy for an image of a recording that cannot be read.
-const OR_SKIP: &str = "or leave out what cannot be read by --skip-bad (skip_bad = true under \
-                       [frames])";
 
 /// The place that a frame's pixels come from.
 #[derive(Clone, Debug)]
@@ -139,23 +133,41 @@ impl FrameFile {
     /// The error of a frame that cannot be decoded; of a format that is not read it names the
     /// conversion.
     pub(super) fn decode_error(&self, what: String) -> FrameError {
-        let (what, remedy) = match (&self.source, self.unread_format()) {
-            (_, Some(format)) => (
-                format!("{} is not read", format.name()),
-                format.remedy(&self.path),
-            ),
-            (FrameSource::File(_), None) => (what, RESTORE_OR_SKIP.to_owned()),
-            (FrameSource::Recording(..), None) => (what, OR_SKIP.to_owned()),
-            (FrameSource::Video(..), None) => (what, "restore the file".to_owned()),
-            (FrameSource::Memory(_), None) => {
-                (what, "leave out the picture and its pose".to_owned())
+        if let Some(format) = self.unread_format() {
+            let what = format!("{} is not read", format.name());
+            return self.error(what, &format.remedy(&self.path), false);
+        }
+        match &self.source {
+            FrameSource::File(_) => self.error(what, "restore the file", true),
+            FrameSource::Recording(..) => self.error(what, "restore the recording", true),
+            FrameSource::Video(..) => self.error(what, "restore the file", false),
+            FrameSource::Memory(_) => self.error(what, "leave out the picture and its pose", false),
+        }
+    }
+
+    /// The error of a picture file that the decoder refuses.
+    pub(super) fn picture_error(&self, error: &ImageError) -> FrameError {
+        let size = std::fs::metadata(self.file()).map_or(1, |metadata| metadata.len());
+        match error {
+            _ if size == 0 => self.decode_error("the file is empty".to_owned()),
+            ImageError::Unsupported(error) if error.format_hint() == ImageFormatHint::Unknown => {
+                self.decode_error("it is no picture of a known format".to_owned())
             }
-        };
+            ImageError::Unsupported(_) if self.unread_format().is_none() => {
+                let remedy = "convert the frames to PNG of 8 or 16 bits";
+                self.error(error.to_string(), remedy, true)
+            }
+            other => self.decode_error(other.to_string()),
+        }
+    }
+
+    fn error(&self, what: String, remedy: &str, can_be_skipped: bool) -> FrameError {
         FrameError::Decode {
             index: self.index,
             path: self.path.clone(),
             what,
-            remedy,
+            remedy: remedy.to_owned(),
+            can_be_skipped,
         }
     }
 
@@ -267,6 +279,7 @@ pub fn list_frames(
     if paths.is_empty() {
         return Err(FrameError::NoFrames {
             pattern: pattern.to_owned(),
+            hint: unmatched_pattern::hint(folder, pattern),
         });
     }
     Ok(paths

@@ -24,6 +24,7 @@ mod recorded_pixels;
 mod shading;
 mod static_pixels;
 mod stored_frame;
+mod unmatched_pattern;
 mod unread_format;
 mod used_bits;
 mod video;
@@ -54,8 +55,9 @@ pub use static_pixels::{
     MotionCell, MotionField, StaticPixels, TemporalStatistics, find_static_pixels,
 };
 pub use stored_frame::StoredFrame;
+pub(crate) use unread_format::RAW_EXTENSIONS;
 pub use unread_format::UnreadFormat;
-pub use used_bits::{UNUSED_UPPER_BITS, has_sixteen_bits, used_bits};
+pub use used_bits::{UNUSED_UPPER_BITS, brightest_bits};
 pub use video::Video;
 pub use write::{
     FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, add_picture, write_picture,

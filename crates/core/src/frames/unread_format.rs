@@ -23,11 +23,18 @@ const HEIF_BRANDS: [&[u8]; 9] = [
     b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1", b"avif",
 ];
 
+/// Extensions of raw pictures other than DNG; most of them begin like TIFF files.
+pub(crate) const RAW_EXTENSIONS: [&str; 10] = [
+    "cr2", "cr3", "nef", "arw", "orf", "rw2", "raf", "pef", "srw", "raw",
+];
+
 /// A format of pictures that is not read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnreadFormat {
     /// Windows bitmap.
     Bmp,
+    /// GIF.
+    Gif,
     /// Netpbm's PGM and PPM, which cameras of machine vision write.
     Netpbm,
     /// JPEG 2000.
@@ -36,6 +43,8 @@ pub enum UnreadFormat {
     Heif,
     /// Adobe's Digital Negative.
     Dng,
+    /// Raw pictures of a camera's maker.
+    Raw,
     /// TIFF with floating point numbers.
     FloatTiff,
 }
@@ -44,10 +53,15 @@ impl UnreadFormat {
     /// The format of a file, by its content; None for all others, and for what cannot be read.
     pub fn of(path: &Path) -> Option<Self> {
         let mut file = open_regular(path).ok()?;
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        if RAW_EXTENSIONS.contains(&extension.to_lowercase().as_str()) {
+            return Some(Self::Raw);
+        }
         let mut start = Vec::new();
         (&file).take(START_BYTES).read_to_end(&mut start).ok()?;
         match start.as_slice() {
             [b'B', b'M', ..] => Some(Self::Bmp),
+            [b'G', b'I', b'F', b'8', ..] => Some(Self::Gif),
             [b'P', b'2' | b'3' | b'5' | b'6', end, ..] if end.is_ascii_whitespace() => {
                 Some(Self::Netpbm)
             }
@@ -101,10 +115,12 @@ impl UnreadFormat {
     pub fn name(self) -> &'static str {
         match self {
             Self::Bmp => "BMP",
+            Self::Gif => "GIF",
             Self::Netpbm => "PGM or PPM",
             Self::Jpeg2000 => "JPEG 2000",
             Self::Heif => "HEIF or AVIF",
             Self::Dng => "DNG",
+            Self::Raw => "a raw picture",
             Self::FloatTiff => "TIFF with floating point numbers",
         }
     }
@@ -114,7 +130,7 @@ impl UnreadFormat {
     pub fn remedy(self, path: &Path) -> String {
         let files = all_beside(path);
         let (command, program, extension) = match self {
-            Self::Bmp | Self::Netpbm | Self::Jpeg2000 => {
+            Self::Bmp | Self::Gif | Self::Netpbm | Self::Jpeg2000 => {
                 let command = format!("mogrify -format png {files}");
                 (command, "ImageMagick", "png")
             }
@@ -128,7 +144,7 @@ impl UnreadFormat {
                 let command = format!("for f in {files}; do {each}; done");
                 (command, "libheif", "png")
             }
-            Self::Dng => (format!("dcraw -T -6 -W -w {files}"), "dcraw", "tiff"),
+            Self::Dng | Self::Raw => (format!("dcraw -T -6 -W -w {files}"), "dcraw", "tiff"),
         };
         format!(
             "convert the frames by `{command}` ({program}) and let frames.images match \
@@ -194,6 +210,7 @@ mod tests {
     fn formats_are_told_by_their_content() {
         for (bytes, expected) in [
             (&b"BM\x7a\xe9\x07\0"[..], UnreadFormat::Bmp),
+            (b"GIF89a\x10\0", UnreadFormat::Gif),
             (b"P5\n4 4\n255\n", UnreadFormat::Netpbm),
             (b"\0\0\0\x0cjP  \r\n\x87\n", UnreadFormat::Jpeg2000),
             (b"\0\0\0\x1cftypheic\0\0\0\0", UnreadFormat::Heif),
@@ -217,6 +234,14 @@ mod tests {
         ] {
             assert_eq!(format_of(bytes), None);
         }
+    }
+
+    #[test]
+    fn raw_pictures_are_told_by_their_names() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("DSC_0001.NEF");
+        std::fs::write(&path, b"MM\0*\0\0\0\x08").unwrap();
+        assert_eq!(UnreadFormat::of(&path), Some(UnreadFormat::Raw));
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! Association of poses with frames.
 
 use super::error::SurveyError;
+use super::frame_times::from_names;
 use super::skipped_frame::SkippedFrame;
 use crate::frames::FrameFile;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+use std::ffi::OsStr;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::{PoseEntry, PoseFile, StampedPose, Trajectory, se3};
@@ -23,6 +25,12 @@ pub enum Associate {
 
 /// Default tolerance between the times of a frame and its pose, seconds; the default of `evo`.
 pub const TIME_TOLERANCE_S: f64 = 0.01;
+
+/// Extensions of pictures that names in pose files may have where the frames have another.
+const PICTURE_EXTENSIONS: [&str; 15] = [
+    "jpg", "jpeg", "png", "tif", "tiff", "webp", "bmp", "pgm", "ppm", "heic", "heif", "dng", "cr2",
+    "nef", "arw",
+];
 
 /// Parameters of the association by time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +65,7 @@ pub(super) fn by_order(
             frames: frames.len(),
             remedy: if file.has_names() {
                 "; or associate them by name (--associate name)"
-            } else if file.has_times() {
+            } else if file.has_times() && (times_s.is_some() || from_names(frames).is_ok()) {
                 "; or associate them by time (--associate time)"
             } else {
                 ""
@@ -71,9 +79,10 @@ pub(super) fn by_order(
         .collect())
 }
 
-/// Associates poses by name: the name in the file of poses must equal the frame's path or its end,
-/// with or without its extension. Poses of other files are ignored, and frames without a pose have
-/// none.
+/// Associates poses by name: the name in the file of poses must equal the frame's path or its end.
+/// Where none does, its extension may be missing, then capitals may differ, then its extension may
+/// be that of another format of pictures, since frames are converted. Backslashes are slashes.
+/// Poses of other files are ignored, and frames without a pose have none.
 ///
 /// # Errors
 /// A file without names; a frame with several poses.
@@ -86,35 +95,21 @@ pub(super) fn by_name(
         path: file.path.clone(),
         what,
     };
-    let mut named: HashMap<String, Vec<(&Path, &PoseEntry)>> = HashMap::new();
-    for entry in &file.entries {
-        let path = Path::new(entry.name.as_deref().ok_or_else(|| {
-            fail(
-                "has no names of frames; associate its poses by --associate order or time"
-                    .to_owned(),
-            )
-        })?);
-        let base = path.file_name().unwrap_or_default().to_string_lossy();
-        named
-            .entry(base.into_owned())
-            .or_default()
-            .push((path, entry));
+    if !file.has_names() {
+        return Err(fail(
+            "has no names of frames; associate its poses by --associate order or time".to_owned(),
+        ));
     }
+    let named = PosesByName::of(file);
     let of_frame = |frame: &FrameFile| {
-        let stem = frame.path.file_stem().unwrap_or_default().to_string_lossy();
-        let name = frame.path.file_name().unwrap_or_default().to_string_lossy();
-        let same = named
-            .get(name.as_ref())
-            .or_else(|| named.get(stem.as_ref()))
-            .map_or(&[][..], Vec::as_slice);
-        let entry = match same {
+        let entry = match named.of_frame(frame) {
             [] => return Ok(None),
             [(_, only)] => Ok(*only),
             // Several folders contain files of that name: compare the path's components.
             several => {
                 let without_extension = frame.path.with_extension("");
-                let is_end = |path: &Path| {
-                    let path = relative(path);
+                let is_end = |path: &str| {
+                    let path = relative(Path::new(path));
                     frame.path.ends_with(path) || without_extension.ends_with(path)
                 };
                 let mut fitting = several.iter().filter(|(path, _)| is_end(path));
@@ -133,6 +128,57 @@ pub(super) fn by_name(
         Ok(Some(stamped(entry, frame.index, times_s)))
     };
     frames.iter().map(of_frame).collect()
+}
+
+/// A pose with its name, in which slashes separate.
+type NamedPose<'a> = (String, &'a PoseEntry);
+
+/// The poses of a file by the names of their frames.
+struct PosesByName<'a> {
+    /// By the last component of the name.
+    exact: HashMap<String, Vec<NamedPose<'a>>>,
+    /// By that in lower case.
+    lower: HashMap<String, Vec<NamedPose<'a>>>,
+    /// By that without the extension of a picture.
+    stem: HashMap<String, Vec<NamedPose<'a>>>,
+}
+
+impl<'a> PosesByName<'a> {
+    fn of(file: &'a PoseFile) -> Self {
+        let mut poses = Self {
+            exact: HashMap::new(),
+            lower: HashMap::new(),
+            stem: HashMap::new(),
+        };
+        for entry in &file.entries {
+            let name = entry.name.as_deref().unwrap_or_default().replace('\\', "/");
+            let base = name.rsplit('/').next().unwrap_or_default().to_owned();
+            let lower = base.to_lowercase();
+            let add = |poses: &mut HashMap<String, Vec<NamedPose<'a>>>, key: String| {
+                poses.entry(key).or_default().push((name.clone(), entry));
+            };
+            if let Some((stem, extension)) = lower.rsplit_once('.')
+                && PICTURE_EXTENSIONS.contains(&extension)
+            {
+                add(&mut poses.stem, stem.to_owned());
+            }
+            add(&mut poses.exact, base);
+            add(&mut poses.lower, lower);
+        }
+        poses
+    }
+
+    /// The poses whose names are most like that of a frame.
+    fn of_frame(&self, frame: &FrameFile) -> &[NamedPose<'a>] {
+        let text = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+        let (name, stem) = (text(frame.path.file_name()), text(frame.path.file_stem()));
+        let found = (self.exact.get(&name))
+            .or_else(|| self.exact.get(&stem))
+            .or_else(|| self.lower.get(&name.to_lowercase()))
+            .or_else(|| self.lower.get(&stem.to_lowercase()))
+            .or_else(|| self.stem.get(&stem.to_lowercase()));
+        found.map_or(&[], Vec::as_slice)
+    }
 }
 
 /// A path without its root and `.` components.
@@ -280,6 +326,34 @@ mod tests {
             .map(|pose| Some(pose.as_ref()?.time_s))
             .collect();
         assert_eq!(times_s, [Some(11.0), Some(12.0), Some(13.0), None]);
+    }
+
+    /// Names of other systems, and those of frames before they were converted.
+    #[test]
+    fn names_may_differ_in_capitals_slashes_and_format() {
+        let found = |names: &[&str], path: &str| {
+            let found = by_name(&file(names), &frames(&[path]), None);
+            found.map(|poses| poses[0].map(|pose| pose.time_s))
+        };
+        let names = [
+            r"C:\Survey\IMG_1.JPG",
+            r"C:\Survey\IMG_2.JPG",
+            "1.25",
+            "2.5",
+        ];
+        for (path, expected) in [
+            ("s/IMG_1.JPG", Some(10.0)),
+            ("s/img_2.jpg", Some(11.0)),
+            ("s/IMG_2.png", Some(11.0)),
+            ("s/1.25.png", Some(12.0)),
+            ("s/2.png", None),
+        ] {
+            assert_eq!(found(&names, path).unwrap(), expected, "{path}");
+        }
+        // The most alike name counts, and where there are several, none.
+        assert_eq!(found(&["A.png", "a.png"], "a.png").unwrap(), Some(11.0));
+        let error = found(&["a.jpg", "a.tif"], "a.png").unwrap_err().to_string();
+        assert!(error.contains("2 poses could be"), "{error}");
     }
 
     #[test]

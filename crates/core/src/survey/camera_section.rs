@@ -94,6 +94,11 @@ impl CameraSection {
             path: toml.to_owned(),
             what: what.to_owned(),
         };
+        if self.name.is_some() && self.horizontal_fov_deg.is_some() {
+            let what = "camera.name selects one of the cameras of camera.file, and there is none \
+                        with camera.horizontal_fov_deg; take one of the two away";
+            return Err(value(what));
+        }
         let camera = match (&self.file, self.horizontal_fov_deg) {
             (Some(file), None) => {
                 read_calibration_of(&folder.join(file), self.name.as_deref(), picture_size)?
@@ -150,6 +155,19 @@ mod tests {
         let error = camera.unwrap_err().to_string();
         assert!(
             error.contains("survey.toml") && error.contains("either file"),
+            "{error}"
+        );
+        let named = CameraSection {
+            name: Some("cam0".to_owned()),
+            horizontal_fov_deg: Some(90.0),
+            ..CameraSection::default()
+        };
+        let camera = named.camera(Path::new("survey.toml"), Path::new(""), &|| {
+            Some([640, 480])
+        });
+        let error = camera.unwrap_err().to_string();
+        assert!(
+            error.contains("camera.name") && error.contains("camera.horizontal_fov_deg"),
             "{error}"
         );
         assert!(

@@ -1,23 +1,22 @@
 //! Search of a folder for the parts of a survey.
 
 use super::file::SURVEY_FILE;
+use super::found_calibration::FoundCalibration;
 use super::left_aside::{LeftAside, reason_by_name, reason_of_text};
 use super::picture_group::PictureGroup;
 use super::recorded_parts::{FoundInRecording, RecordedFrames, RecordedParts};
 use super::straight_axis::{AXIS_FILE, FoundAxis};
+use super::walked_folder::WalkedFolder;
 use crate::frames::{FrameError, PictureOrientation, Video};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use tunnelstitch_geometry::camera::{Camera, read_calibration_of};
 use tunnelstitch_geometry::recordings::is_recording;
 use tunnelstitch_geometry::trajectory::gyro::gopro_readout_ms;
 use tunnelstitch_geometry::trajectory::{
     DuplicateTimes, PoseFile, PoseFileOptions, read_poses_with,
 };
 
-/// Levels of folders below the searched one.
-const MAX_DEPTH: usize = 3;
 /// Larger files are not tried as calibrations.
 const MAX_CALIBRATION_BYTES: u64 = 4 << 20;
 /// Larger files are not tried as poses.
@@ -60,7 +59,7 @@ pub struct Discovery {
     /// Groups of pictures, the largest first.
     pub pictures: Vec<PictureGroup>,
     /// Calibrations, those with the frames' size first, and among these those that state it.
-    pub calibrations: Vec<(PathBuf, Camera)>,
+    pub calibrations: Vec<FoundCalibration>,
     /// Pose files; first those with as many poses as frames, and among these first those not named
     /// as ground truth.
     pub poses: Vec<(PathBuf, PoseFile)>,
@@ -83,9 +82,7 @@ impl Discovery {
     /// # Errors
     /// A folder that cannot be read.
     pub fn of(folder: &Path) -> std::io::Result<Self> {
-        let mut walked = Walked::default();
-        walk(folder, Path::new(""), MAX_DEPTH, &mut walked)?;
-        walked.files.sort();
+        let walked = WalkedFolder::of(folder)?;
         let group = |((parent, extension), files): (&(PathBuf, String), &Vec<&PathBuf>)| {
             PictureGroup::of(folder, parent, extension, files)
         };
@@ -126,8 +123,12 @@ impl Discovery {
 
     /// Takes the parts of a recording.
     fn take_recording(&mut self, file: &Path, found: FoundInRecording) {
-        let camera = found.camera.map(|camera| (file.to_owned(), camera));
-        self.calibrations.extend(camera);
+        let calibration = found.camera.map(|camera| FoundCalibration {
+            path: file.to_owned(),
+            camera,
+            selected: None,
+        });
+        self.calibrations.extend(calibration);
         let poses = found.poses.map(|poses| (file.to_owned(), poses));
         self.poses.extend(poses);
         self.recordings.push(found.parts);
@@ -160,11 +161,11 @@ impl Discovery {
             is_tried = true;
             let size = || self.picture_size();
             match read_up_to(MAX_CALIBRATION_BYTES, bytes, || {
-                read_calibration_of(&path, None, &size)
+                FoundCalibration::read(folder, file, &size)
             }) {
-                Ok(camera) => {
+                Ok(found) => {
                     is_taken = true;
-                    self.calibrations.push((file.to_owned(), camera));
+                    self.calibrations.push(found);
                 }
                 Err(error) => refusals.push(format!("no calibration: {error}")),
             }
@@ -241,21 +242,19 @@ impl Discovery {
         self.pictures.first().filter(|_| has_pictures)
     }
 
-    /// Decodes a dozen frames of the searched `folder`, if the calibration fits them, to find out
-    /// whether files of 16 bits leave the upper bits empty.
+    /// Decodes frames of the searched `folder`, if the calibration fits them, to find out whether
+    /// files of 16 bits leave the upper bits empty.
     pub fn find_bits(&mut self, folder: &Path) {
         let mask = self.mask.as_ref().map(|mask| folder.join(mask));
         let frames = self.picture_frames().zip(self.calibrations.first());
-        self.bits = frames.and_then(|(group, (_, camera))| {
-            group.bits(folder, mask.as_deref(), (camera.width, camera.height))
-        });
+        self.bits =
+            frames.and_then(|(group, found)| group.bits(folder, mask.as_deref(), found.size()));
     }
 
     /// The orientation of the frames that the calibration asks for, where their EXIF data name one.
     pub fn orientation(&self) -> Option<PictureOrientation> {
-        let (_, camera) = self.calibrations.first()?;
-        self.picture_frames()?
-            .orientation((camera.width, camera.height))
+        let size = self.calibrations.first()?.size();
+        self.picture_frames()?.orientation(size)
     }
 
     /// Number of frames, and their size if known, pixels.
@@ -280,10 +279,10 @@ impl Discovery {
             .sort_by_key(|group| std::cmp::Reverse(group.count));
         let (count, size) = self.frames();
         let turned = self.picture_frames().and_then(|group| group.turned_size);
-        self.calibrations.sort_by_key(|(path, camera)| {
-            let calibrated = Some((camera.width, camera.height));
+        self.calibrations.sort_by_key(|found| {
+            let calibrated = Some(found.size());
             let other_size = (calibrated != size, calibrated != turned);
-            (other_size, has_no_size(path))
+            (other_size, has_no_size(&found.path))
         });
         self.poses.sort_by_key(|(path, poses)| {
             let other_count = poses.entries.len() != count;
@@ -383,41 +382,6 @@ fn read_up_to<T, E: Display>(
     read().map_err(|error| error.to_string())
 }
 
-/// The files below a folder, and what was not searched or cannot be read, with the reasons.
-#[derive(Default)]
-struct Walked {
-    files: Vec<PathBuf>,
-    unsearched: Vec<(PathBuf, String)>,
-}
-
-fn walk(root: &Path, inner: &Path, depth: usize, walked: &mut Walked) -> std::io::Result<()> {
-    for entry in std::fs::read_dir(root.join(inner))? {
-        let entry = entry?;
-        let path = inner.join(entry.file_name());
-        if entry.file_name().to_string_lossy().starts_with('.') {
-            continue;
-        }
-        let kind = match root.join(&path).metadata() {
-            Ok(kind) => kind,
-            Err(error) => {
-                walked.unsearched.push((path, error.to_string()));
-                continue;
-            }
-        };
-        if kind.is_file() {
-            walked.files.push(path);
-        } else if kind.is_dir() && depth > 0 {
-            if let Err(error) = walk(root, &path, depth - 1, walked) {
-                walked.unsearched.push((path, error.to_string()));
-            }
-        } else if kind.is_dir() {
-            let reason = format!("not searched: more than {MAX_DEPTH} folders below");
-            walked.unsearched.push((path, reason));
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -429,7 +393,7 @@ mod tests {
         let group = &found.pictures[0];
         assert_eq!((group.pattern.as_str(), group.count), ("frames/*.jpg", 48));
         assert_eq!(group.size, Some((480, 360)));
-        assert_eq!(found.calibrations[0].0, Path::new("camera.json"));
+        assert_eq!(found.calibrations[0].path, Path::new("camera.json"));
         assert_eq!(found.initial().unwrap().0, Path::new("baseline.tum"));
         assert_eq!(found.truth().unwrap().0, Path::new("groundtruth.tum"));
     }
@@ -469,7 +433,7 @@ mod tests {
         assert_eq!(found.mask.as_deref(), Some(Path::new("images/Mask.png")));
         let calibrations = found.calibrations.iter();
         let calibrations: Vec<_> = calibrations
-            .map(|(path, c)| (path.as_path(), c.width))
+            .map(|found| (found.path.as_path(), found.camera.width))
             .collect();
         let expected = [("b.txt", 64), ("a.out", 64), ("a.txt", 128)];
         assert_eq!(
@@ -478,6 +442,20 @@ mod tests {
         );
         assert_eq!(found.initial().unwrap().0, Path::new("right.tum"));
         assert!(found.truth().is_none());
+    }
+
+    /// The results of a run that are kept in the folder of the survey.
+    #[test]
+    fn refined_poses_are_no_initial_ones() {
+        let dir = tempfile::tempdir().unwrap();
+        let results = dir.path().join("refined");
+        std::fs::create_dir(&results).unwrap();
+        std::fs::write(results.join("poses.tum"), "0 0 0 0 0 0 0 1\n").unwrap();
+        assert!(Discovery::of(dir.path()).unwrap().initial().is_some());
+        std::fs::write(results.join("refine.json"), "{}").unwrap();
+        let found = Discovery::of(dir.path()).unwrap();
+        assert!(found.initial().is_none());
+        assert_eq!(found.left_aside[0].pattern, "refined");
     }
 
     /// As many poses as frames are there only because one of two was left out.

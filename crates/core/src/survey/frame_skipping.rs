@@ -11,7 +11,7 @@ use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 /// are renumbered.
 ///
 /// # Errors
-/// The error of the first frame, if no frame can be read.
+/// That of all frames, if none can be read.
 pub(super) fn skip_unreadable(
     list: FrameList,
     (width, height): (u32, u32),
@@ -34,7 +34,7 @@ pub(super) fn skip_unreadable(
     if kept.is_empty()
         && let Some(first) = errors.into_iter().flatten().next()
     {
-        return Err(first.into());
+        return Err(first.of_all(list.frames.len()).into());
     }
     let of_kept = |times_s: Vec<f64>| kept.iter().map(|k| times_s[*k]).collect();
     let list = FrameList {
@@ -89,6 +89,6 @@ mod tests {
         let Err(error) = skip_unreadable(list(dir.path(), &["0.png", "1.png"]), (32, 24)) else {
             panic!("no frame can be read");
         };
-        assert!(error.to_string().contains("frame 0"), "{error}");
+        assert!(error.to_string().starts_with("all 2 frames ("), "{error}");
     }
 }

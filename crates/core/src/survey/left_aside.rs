@@ -1,6 +1,6 @@
 //! Files of a folder that are no part of the survey found in it, with the reasons.
 
-use crate::frames::UnreadFormat;
+use crate::frames::{RAW_EXTENSIONS, UnreadFormat};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,8 +8,8 @@ use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::read_tunnel_frame;
 
 /// Extensions of pictures in formats that are not read.
-const UNREAD_EXTENSIONS: [&str; 11] = [
-    "bmp", "dib", "pgm", "ppm", "pnm", "jp2", "heic", "heif", "hif", "avif", "dng",
+const UNREAD_EXTENSIONS: [&str; 12] = [
+    "bmp", "dib", "gif", "pgm", "ppm", "pnm", "jp2", "heic", "heif", "hif", "avif", "dng",
 ];
 /// Extensions of files of measured points.
 const POINT_EXTENSIONS: [&str; 3] = ["ply", "las", "laz"];
@@ -33,7 +33,7 @@ impl LeftAside {
     pub fn is_unread_picture(&self) -> bool {
         let extension = Path::new(&self.pattern).extension().unwrap_or_default();
         let extension = extension.to_string_lossy().to_lowercase();
-        UNREAD_EXTENSIONS.contains(&extension.as_str())
+        is_unread(&extension)
     }
 
     /// Files with their reasons; those of one folder with the same extension and reason are one.
@@ -62,11 +62,16 @@ impl LeftAside {
     }
 }
 
+/// True for the extension, in lower case, of pictures in a format that is not read.
+fn is_unread(extension: &str) -> bool {
+    UNREAD_EXTENSIONS.contains(&extension) || RAW_EXTENSIONS.contains(&extension)
+}
+
 /// The reason why a file is left aside that neither is a picture or a video nor was tried as
 /// calibration or poses. `file` is relative to `folder`, `extension` in lower case.
 pub(super) fn reason_by_name(folder: &Path, file: &Path, extension: &str) -> String {
     let path = folder.join(file);
-    if UNREAD_EXTENSIONS.contains(&extension)
+    if is_unread(extension)
         && let Some(format) = UnreadFormat::of(&path)
     {
         return format!("{} is not read; {}", format.name(), format.remedy(&path));

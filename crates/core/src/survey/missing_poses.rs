@@ -4,7 +4,7 @@ use super::error::SurveyError;
 use crate::frames::FrameFile;
 use std::ops::Range;
 use std::path::Path;
-use tunnelstitch_geometry::files::printed;
+use tunnelstitch_geometry::files::{escape_controls, printed};
 use tunnelstitch_geometry::trajectory::{StampedPose, Trajectory, se3};
 
 /// Most names of frames in a message.
@@ -51,8 +51,9 @@ fn gaps<T>(poses: &[Option<T>]) -> Vec<PoseGap> {
     gaps
 }
 
-/// Completes the poses of the file `path` at the frames that it leaves out. `times_s`: the frames'
-/// times, if given by a file or a video; else a frame's share of the way counts frames.
+/// Completes the poses of the file `path`, whose first pose is that of `first_name`, at the frames
+/// that it leaves out. `times_s`: the frames' times, if given by a file or a video; else a frame's
+/// share of the way counts frames.
 ///
 /// # Errors
 /// Poses of fewer than half of the frames, or of fewer than two, or missing ones that are to be
@@ -61,7 +62,7 @@ pub(super) fn complete(
     path: &Path,
     frames: &[FrameFile],
     times_s: Option<&[f64]>,
-    poses: &[Option<StampedPose>],
+    (poses, first_name): (&[Option<StampedPose>], Option<&str>),
     missing: MissingPoses,
 ) -> Result<(Trajectory, Vec<PoseGap>), SurveyError> {
     let fail = |what: String| SurveyError::Association {
@@ -77,10 +78,15 @@ pub(super) fn complete(
     let is_enough = known.len() >= 2 && 2 * known.len() >= poses.len();
     if !gaps.is_empty() && (missing == MissingPoses::Refuse || !is_enough) {
         let remedy = match missing {
-            MissingPoses::Refuse => "",
+            MissingPoses::Refuse => String::new(),
             MissingPoses::Interpolate => {
-                "; at least half of the frames, and two, must have one: check that the names in \
-                 the file are those of the frames"
+                let example = first_name.map_or(String::new(), |name| {
+                    format!(", such as `{}`,", escape_controls(name))
+                });
+                format!(
+                    "; at least half of the frames, and two, must have one: check that the names \
+                     in the file{example} are those of the frames"
+                )
             }
         };
         let without = poses.len() - known.len();
@@ -183,7 +189,7 @@ mod tests {
             Path::new("images.txt"),
             &frames(count),
             None,
-            &poses,
+            (&poses, Some("a.png")),
             missing,
         )
     }
@@ -220,7 +226,7 @@ mod tests {
             Path::new("images.txt"),
             &frames(3),
             Some(&times_s),
-            &poses,
+            (&poses, None),
             MissingPoses::Interpolate,
         )
         .unwrap();
@@ -234,12 +240,7 @@ mod tests {
         let interpolate = MissingPoses::Interpolate;
         assert!(completed(4, &[1, 2], interpolate).is_ok());
         for (count, without, missing, expected) in [
-            (
-                4,
-                &[1, 2, 3][..],
-                interpolate,
-                "3 of 4 frames; at least half",
-            ),
+            (4, &[1, 2, 3][..], interpolate, "such as `a.png`, are those"),
             (2, &[1], interpolate, "no pose of frame 1 (1.png); at least"),
             (
                 20,

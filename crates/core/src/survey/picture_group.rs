@@ -1,13 +1,10 @@
 //! Groups of pictures in a searched folder.
 
 use crate::frames::{
-    FrameFile, PictureOrientation, PictureReading, StoredFrame, UNUSED_UPPER_BITS,
-    has_sixteen_bits, list_frames, used_bits,
+    FrameFile, PictureOrientation, PictureReading, UNUSED_UPPER_BITS, brightest_bits, list_frames,
 };
 use std::path::{Path, PathBuf};
-
-/// Largest number of frames that are decoded.
-const MAX_DECODED_FRAMES: usize = 12;
+use tunnelstitch_geometry::trajectory::times;
 
 /// The pictures of one folder with one extension.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +13,8 @@ pub struct PictureGroup {
     pub pattern: String,
     /// Number of pictures.
     pub count: usize,
+    /// True if the name of the first picture has its time.
+    pub names_time: bool,
     /// Width and height of the first picture, pixels, if readable.
     pub size: Option<(u32, u32)>,
     /// Width and height of the first picture when it is turned or mirrored as its EXIF data ask,
@@ -29,8 +28,15 @@ impl PictureGroup {
     /// The group of the files of a folder's `parent` with an extension; `folder` is the searched
     /// one, to which paths are relative.
     pub(super) fn of(folder: &Path, parent: &Path, extension: &str, files: &[&PathBuf]) -> Self {
-        let pattern = parent.join(format!("*.{extension}"));
+        // Names of folders may hold what a pattern gives a meaning.
+        let parent = glob::Pattern::escape(&parent.to_string_lossy());
+        let pattern = Path::new(&parent).join(format!("*.{extension}"));
         let path = files.first().map(|first| folder.join(first));
+        let stem = path
+            .as_deref()
+            .and_then(Path::file_stem)
+            .unwrap_or_default();
+        let names_time = times::from_name(&stem.to_string_lossy()).is_some();
         let first = FrameFile::picture(0, path.unwrap_or_default());
         let size = first.size();
         let is_turned = first.exif_orientation().is_ok_and(|named| named.is_some());
@@ -41,6 +47,7 @@ impl PictureGroup {
         Self {
             pattern: pattern.to_string_lossy().replace('\\', "/"),
             count: files.len(),
+            names_time,
             fault: size.as_ref().err().map(ToString::to_string),
             size: size.ok(),
             turned_size: match is_turned {
@@ -61,25 +68,17 @@ impl PictureGroup {
         }
     }
 
-    /// Bits of the values, if the pictures are files of 16 bits whose upper bits are empty, as far
-    /// as a dozen of them show. `folder` is the searched one, `size` that of the calibration: other
-    /// pictures are not decoded.
+    /// Bits of the values, if the pictures are files of 16 bits and all leave their upper bits
+    /// empty. `folder` is the searched one, `size` that of the calibration: other pictures are not
+    /// decoded.
     pub(super) fn bits(&self, folder: &Path, mask: Option<&Path>, size: (u32, u32)) -> Option<u32> {
         let reading = PictureReading {
             orientation: self.orientation(size).unwrap_or_default(),
             ..PictureReading::default()
         };
-        let frames = list_frames(folder, &self.pattern, mask).ok()?;
-        let step = frames.len().div_ceil(MAX_DECODED_FRAMES);
-        let used = frames.into_iter().step_by(step).filter_map(|file| {
-            let file = file.with_reading(reading);
-            if !has_sixteen_bits(&file) {
-                return None;
-            }
-            let frame = StoredFrame::decode(&file, size.0, size.1).ok()?;
-            used_bits(&frame)
-        });
-        used.max().filter(|bits| UNUSED_UPPER_BITS.contains(bits))
+        let frames = list_frames(folder, &self.pattern, mask).ok()?.into_iter();
+        let frames: Vec<FrameFile> = frames.map(|file| file.with_reading(reading)).collect();
+        brightest_bits(&frames, size).filter(|bits| UNUSED_UPPER_BITS.contains(bits))
     }
 }
 
@@ -92,6 +91,7 @@ mod tests {
         let group = |turned_size| PictureGroup {
             pattern: "*.jpg".to_owned(),
             count: 1,
+            names_time: false,
             size: Some((64, 48)),
             turned_size,
             fault: None,

@@ -115,8 +115,10 @@ impl<'a> PoseReader<'a> {
             Associate::Order => by_order(&file, frames, skipped, times_s)?,
             Associate::Name => {
                 let named = by_name(&file, frames, times_s)?;
+                let first = file.entries.first().and_then(|entry| entry.name.as_deref());
+                let named = (named.as_slice(), first);
                 let (given, left_out) =
-                    missing_poses::complete(&file.path, frames, times_s, &named, missing)?;
+                    missing_poses::complete(&file.path, frames, times_s, named, missing)?;
                 gaps = left_out;
                 given
             }

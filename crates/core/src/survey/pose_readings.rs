@@ -13,7 +13,7 @@ use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::Surface;
-use tunnelstitch_geometry::trajectory::{Pose, PoseFormat, Trajectory};
+use tunnelstitch_geometry::trajectory::{Pose, PoseFormat, StampedPose, Trajectory};
 
 /// Units that positions may be given in instead of metres: their names, and their lengths, metres.
 const UNITS: [(&str, f64); 3] = [
@@ -24,6 +24,10 @@ const UNITS: [(&str, f64); 3] = [
 
 /// Focal lengths over the given one that are tried: nearer ones are found by estimating them.
 const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
+
+/// Radii of a round tunnel over the given one that are tried: a diameter is given for the radius,
+/// or half a radius.
+const RADIUS_FACTORS: [(f64, &str); 2] = [(0.5, "twice"), (2.0, "half")];
 
 /// Places that poses may be off by, later or earlier.
 const SHIFTS: [isize; 6] = [1, -1, 2, -2, 3, -3];
@@ -93,7 +97,8 @@ impl PoseReading {
 impl Survey {
     /// The initial poses as given, followed by every other reading that leaves all cameras inside:
     /// other conventions, the reverse order, quaternions that begin with w, other units, poses of
-    /// other frames, pictures that are turned or mirrored, and other focal lengths.
+    /// other frames, a diameter for the radius, pictures that are turned or mirrored, and other
+    /// focal lengths.
     ///
     /// # Errors
     /// The errors of [`Survey::open`], if the file has changed since.
@@ -129,7 +134,10 @@ impl Survey {
             ..as_given.clone()
         });
         let lenses = self.other_focal_lengths(&as_given);
-        let others = poses.chain(pictures).chain(lenses);
+        let others = poses
+            .chain(self.other_radii())
+            .chain(pictures)
+            .chain(lenses);
         Ok(std::iter::once(as_given.clone()).chain(others).collect())
     }
 
@@ -149,6 +157,31 @@ impl Survey {
             changes: 1,
             focal_factor,
             ..as_given.clone()
+        })
+    }
+
+    /// Readings of a straight round tunnel with another radius. Pictures of it are those of the
+    /// given one, seen from positions that are scaled about its axis.
+    fn other_radii(&self) -> impl Iterator<Item = PoseReading> {
+        let tunnel = &self.file.tunnel;
+        let is_straight = tunnel.centreline.is_none();
+        let radius_m = tunnel
+            .radius_m
+            .filter(|_| is_straight && self.bend.is_none());
+        let factors = RADIUS_FACTORS.into_iter();
+        factors.filter_map(move |(factor, given)| {
+            let radius_m = factor * radius_m?;
+            let scaled = |stamped: &StampedPose| StampedPose {
+                pose: Pose::new(stamped.pose.r_wc, stamped.pose.t_wc / factor),
+                ..*stamped
+            };
+            let remedy = format!(
+                "a tunnel of which {given} the radius is given (radius_m = {radius_m} under \
+                 [tunnel])"
+            );
+            let initial = self.initial.iter().map(scaled).collect();
+            let reading = PoseReading::of_poses(remedy, 1, initial);
+            is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)
         })
     }
 

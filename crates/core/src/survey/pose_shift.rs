@@ -45,7 +45,8 @@ pub(super) fn shifted(
         .collect();
     let times_s: Vec<f64> = read.given.iter().map(|stamped| stamped.time_s).collect();
     let interpolate = MissingPoses::Interpolate;
-    let (given, gaps) = missing_poses::complete(path, frames, Some(&times_s), &moved, interpolate)?;
+    let (given, gaps) =
+        missing_poses::complete(path, frames, Some(&times_s), (&moved, None), interpolate)?;
     Ok(InterpretedPoses {
         given,
         gaps,

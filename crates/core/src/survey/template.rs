@@ -53,13 +53,20 @@ impl Discovery {
                  plants: refine ignores this part of the wall\n";
         text += "\n[camera]\n";
         let _ = match self.calibrations.first() {
-            Some((path, _)) => {
-                let parts = self.parts_of(path);
+            Some(found) => {
+                let parts = self.parts_of(&found.path);
                 let topic = parts.and_then(|parts| parts.calibration.as_ref());
-                let topic = topic.map_or(String::new(), |topic| {
-                    format!("name = {}    # its topic\n", quoted(topic))
-                });
-                write!(text, "file = {}\n{topic}", quoted(path))
+                let name = match (topic, &found.selected) {
+                    (Some(topic), _) => format!("name = {}    # its topic\n", quoted(topic)),
+                    (None, Some(selected)) => format!(
+                        "name = {}    # of its {} cameras, which differ; take the one of the \
+                         frames\n",
+                        quoted(&selected.name),
+                        selected.of
+                    ),
+                    (None, None) => String::new(),
+                };
+                write!(text, "file = {}\n{name}", quoted(&found.path))
             }
             None => writeln!(
                 text,
@@ -115,7 +122,7 @@ impl Discovery {
             ),
             (None, None) => writeln!(
                 text,
-                "\n[frames]\nimages = {}    # sorted by name",
+                "\n[frames]\nimages = {}    # in natural order of their names",
                 quoted(pattern)
             ),
         };
@@ -209,7 +216,8 @@ impl Discovery {
             let _ = writeln!(text, "topic = {}", quoted(topic));
         }
         let is_by_time = poses.entries.len() != count || !poses.conflicts.is_empty();
-        if is_by_time && poses.has_times() && !poses.has_names() {
+        let frames_have_times = self.picture_frames().is_none_or(|group| group.names_time);
+        if is_by_time && frames_have_times && poses.has_times() && !poses.has_names() {
             *text += if self.video.is_some() {
                 "associate = \"time\"       # by the video's times, or by [frames] times = FILE\n\
                  interpolate = true\n"

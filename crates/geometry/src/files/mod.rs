@@ -5,6 +5,7 @@
 //! | --- | --- |
 //! | opening and reading of regular files | [`regular`] |
 //! | numbers and names of binary files | [`binary`] |
+//! | encodings of text files | [`encoding`] |
 //! | numbers of JSON files | [`json`] |
 //! | largest sizes of text files | [`limits`] |
 //! | files that are locked or appended to, and targets that may be replaced | [`targets`] |
@@ -12,6 +13,7 @@
 //! | names and texts without control characters | [`printed()`] |
 
 pub mod binary;
+pub mod encoding;
 pub mod json;
 pub mod limits;
 pub mod printed;
@@ -20,6 +22,7 @@ pub mod targets;
 pub mod xml;
 
 pub use binary::BinaryFile;
+pub use encoding::decode_text;
 pub use printed::{escape_controls, printed};
 pub use regular::{open_regular, read_regular, read_text};
 pub use targets::{check_replaceable_file, open_without_links, write_without_links};

@@ -1,5 +1,6 @@
 //! Opening and reading of regular files.
 
+use super::encoding::decode_text;
 use std::fs::{File, FileType, OpenOptions};
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
@@ -32,11 +33,11 @@ pub fn read_regular(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 /// Reads a regular text file of at most `max_bytes`.
 ///
 /// # Errors
-/// The errors of [`read_regular`]; a file that is not UTF-8 text.
+/// The errors of [`read_regular`]; a file that is no text that [`decode_text`] knows.
 pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<String> {
     let bytes = read_regular(path, max_bytes)?;
-    String::from_utf8(bytes)
-        .map_err(|_| io::Error::new(ErrorKind::InvalidData, "it is not UTF-8 text"))
+    decode_text(&bytes)
+        .map_err(|what| io::Error::new(ErrorKind::InvalidData, format!("the file {what}")))
 }
 
 /// Reads an open file to its end, at most `max_bytes`.
@@ -135,7 +136,7 @@ mod tests {
         assert_eq!(read_text(&path, 5).unwrap(), "12345");
         let error = read_text(&path, 4).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::FileTooLarge);
-        std::fs::write(&path, [0xff]).unwrap();
+        std::fs::write(&path, [0x81]).unwrap();
         assert!(
             read_text(&path, 5)
                 .unwrap_err()

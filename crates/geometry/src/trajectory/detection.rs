@@ -46,7 +46,7 @@ pub(super) fn detect_format(
         .count();
     match (numbers, words.len()) {
         // A line of a wrong length is reported by the parser of the nearest format.
-        (12, 12) => Ok(PoseFormat::Kitti),
+        (12, 12) | (kitti::WHOLE_MATRIX, kitti::WHOLE_MATRIX) => Ok(PoseFormat::Kitti),
         (most, all) if most >= 5 && all <= 9 => Ok(PoseFormat::Tum),
         _ => Err(PoseError::line(
             path,
@@ -71,7 +71,7 @@ fn by_beginning(text: &str, options: &PoseFileOptions) -> Option<PoseFormat> {
     let list = trimmed.strip_prefix('[').map(str::trim_start);
     let first_line = || text::lines(text).next().map(|(_, line)| line);
     if trimmed.starts_with('{') {
-        Some(detect_json(text))
+        detect_json(text)
     } else if list.is_some_and(|list| list.starts_with(['{', ']'])) {
         Some(PoseFormat::Opensfm)
     } else if trimmed.starts_with('<') {
@@ -90,16 +90,21 @@ fn by_beginning(text: &str, options: &PoseFileOptions) -> Option<PoseFormat> {
 /// Keys at the top of JSON files, without their values.
 #[derive(Default, Deserialize)]
 struct TopKeys {
+    frames: Option<IgnoredAny>,
     poses: Option<IgnoredAny>,
     extrinsics: Option<IgnoredAny>,
 }
 
-/// Detects the format of a JSON object; what is none is left to the parser of nerfstudio's.
-fn detect_json(text: &str) -> PoseFormat {
-    let keys: TopKeys = serde_json::from_str(text).unwrap_or_default();
-    match (keys.poses, keys.extrinsics) {
-        (Some(_), None) => PoseFormat::Meshroom,
-        (None, Some(_)) => PoseFormat::Openmvg,
-        _ => PoseFormat::Nerfstudio,
+/// Detects the format of a JSON object; None if it is valid and of none. What is not valid is left
+/// to the parser of nerfstudio's.
+fn detect_json(text: &str) -> Option<PoseFormat> {
+    let Ok(keys) = serde_json::from_str::<TopKeys>(text) else {
+        return Some(PoseFormat::Nerfstudio);
+    };
+    match (keys.poses, keys.extrinsics, keys.frames) {
+        (Some(_), None, None) => Some(PoseFormat::Meshroom),
+        (None, Some(_), None) => Some(PoseFormat::Openmvg),
+        (_, _, Some(_)) => Some(PoseFormat::Nerfstudio),
+        (None, None, None) | (Some(_), Some(_), None) => None,
     }
 }

@@ -184,15 +184,30 @@ fn what_is_no_text_is_refused() {
     for bytes in [
         &[0xff, 0xfe, 0x30][..],
         b"0 0 0 0 0 0 0 1\0\n",
-        &[0x89, b'P', b'N', b'G'],
+        b"\x89PNG\r\n\x1a\n",
     ] {
         let message = read_poses(&file_of(bytes).1, None).unwrap_err().to_string();
-        assert!(message.contains("is not UTF-8 text"), "{message}");
+        assert!(message.contains("is no text of UTF-8"), "{message}");
     }
     let message = read_poses(Path::new("/nowhere/poses.tum"), None)
         .unwrap_err()
         .to_string();
     assert!(message.contains("cannot read the file"), "{message}");
+}
+
+/// Matrices of 4 × 4 are those of 3 × 4 with a row that says nothing.
+#[test]
+fn whole_matrices_are_rows_of_kitti() {
+    let read = read_text("0 0 1 4 1 0 0 5 0 1 0 6 0 0 0 1\n").unwrap();
+    let expected = read_text("0 0 1 4 1 0 0 5 0 1 0 6\n").unwrap();
+    assert_eq!(read.format, PoseFormat::Kitti);
+    assert_eq!(read.entries, expected.entries);
+    let transposed = read_text("0 1 0 0 0 0 1 0 1 0 0 0 4 5 6 1\n").unwrap_err();
+    let message = transposed.to_string();
+    assert!(
+        message.contains(":1: the last row of the 4 × 4 matrix is 4 5 6 1"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -520,7 +535,7 @@ fn wrong_lines_are_named_with_the_remedy() {
         // nerfstudio.
         ("{\"frames\": []}".into(), "holds no poses"),
         ("{\"frames\": [".into(), "line 1 column"),
-        ("{}".into(), "missing field `frames`"),
+        ("{}".into(), ":1: in no known format"),
         (
             "{\"frames\": [{\"file_path\": \"a\", \"transform_matrix\": \
              [[1,0,0,0],[0,1,0,0],[0,0,2,0]]}]}"

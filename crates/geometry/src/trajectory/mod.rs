@@ -41,7 +41,6 @@ mod colmap_binary;
 mod convention;
 pub mod csv;
 mod detection;
-mod encoding;
 mod entry_list;
 mod error;
 mod euroc;

@@ -137,7 +137,7 @@ mod tests {
             ("T_BS:\n data: [1, 0, 0]\n", "3 numbers"),
             ("T_BS:\n data: [1, 0, x]\n", "`x` is not a number"),
             (&format!("{identity}{identity}"), "both T_BS and T_BS"),
-            ("\u{0}", "is not UTF-8 text"),
+            ("\u{0}", "is no text of UTF-8"),
         ] {
             let message = read_text(text).unwrap_err().to_string();
             assert!(message.contains(expected), "{message}");

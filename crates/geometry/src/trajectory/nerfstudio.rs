@@ -28,8 +28,8 @@ struct Frame {
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
     let fail = |what: String| PoseError::file(path, what);
-    let transforms: Transforms =
-        serde_json::from_str(text).map_err(|error| fail(error.to_string()))?;
+    let transforms: Transforms = serde_json::from_str(text)
+        .map_err(|error| fail(format!("is not transforms.json: {error}")))?;
     if let Some(scale) = transforms.applied_scale
         && scale != 1.0
     {

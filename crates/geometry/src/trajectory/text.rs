@@ -1,18 +1,17 @@
 //! Elements of all text formats: lines, numbers, times, quaternions and names.
 
-use super::encoding::decode;
 use super::entry_list::{DuplicateTimes, EntryList, ParsedPoses};
 use super::error::PoseError;
 use super::pose_entry::PoseEntry;
 use super::times;
 use crate::files::limits::MAX_TABLE_BYTES;
-use crate::files::read_regular;
+use crate::files::{decode_text, read_regular};
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::Path;
 
-/// Reads a text file of UTF-8, or of UTF-16 with a byte order mark, and removes that mark.
+/// Reads a text file of any encoding that [`decode_text`] knows.
 ///
 /// # Errors
 /// An unreadable file, or one that is no such text.
@@ -21,9 +20,7 @@ pub fn read(path: &Path) -> Result<String, PoseError> {
         path: path.to_owned(),
         source,
     })?;
-    decode(&bytes).ok_or_else(|| {
-        PoseError::file(path, "is not UTF-8 text, nor UTF-16 with a byte order mark")
-    })
+    decode_text(&bytes).map_err(|what| PoseError::file(path, what))
 }
 
 /// The lines with content and their 1-based numbers; blank lines and comments that begin with `#`

@@ -34,10 +34,50 @@ impl FittingReadings {
         } else {
             format!("odds of more than 10^{MAX_ODDS_POWER:.0} to 1")
         };
-        format!(
-            "the frames do not agree with poses, pictures and camera as given ({given} of {pairs} \
-             neighbours fit each other); they agree ({fitting} of {pairs}, {odds}) with {}",
-            readings.join(", or with ")
-        )
+        let readings = readings.join(", or with ");
+        // Pairs may fit in both readings, far from the prior in one of them.
+        if 4 * given < 3 * pairs {
+            format!(
+                "the frames do not agree with poses, pictures and camera as given ({given} of \
+                 {pairs} neighbours fit each other); they agree ({fitting} of {pairs}, {odds}) \
+                 with {readings}"
+            )
+        } else {
+            format!(
+                "the frames agree better than with poses, pictures and camera as given, by which \
+                 {given} of {pairs} neighbours fit each other, but far from their prior, with \
+                 {readings} ({fitting} of {pairs}, {odds})"
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sentence_does_not_contradict_its_numbers() {
+        let sentence = |given| {
+            let found = FittingReadings {
+                readings: vec!["a".to_owned(), "b".to_owned()],
+                fitting: 7,
+                given,
+                pairs: 7,
+                log_odds: 39.0,
+            };
+            found.sentence()
+        };
+        let none = sentence(0);
+        assert!(
+            none.contains("do not agree") && none.contains("(0 of 7"),
+            "{none}"
+        );
+        let all = sentence(7);
+        assert!(
+            all.contains("agree better") && all.contains("a, or with b (7 of 7"),
+            "{all}"
+        );
+        assert!(!all.contains("do not"), "{all}");
     }
 }

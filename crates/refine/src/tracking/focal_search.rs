@@ -39,7 +39,7 @@ pub fn search_focal_length(
 ) -> Result<Kappa, ProblemError> {
     let calibration = &context.calibration;
     let sigma = calibration.sigma[FOCAL_INDEX];
-    let reach = (REACH_SIGMAS * sigma / STEP) as i32;
+    let reach = reach(sigma);
     if reach == 0 || !calibration.free[FOCAL_INDEX] {
         return Ok(Kappa::zeros());
     }
@@ -61,6 +61,20 @@ pub fn search_focal_length(
     }
     progress.finish();
     Ok(found)
+}
+
+/// Number of steps that the search goes to either side, for a prior of `sigma` (1-σ of ln f).
+fn reach(sigma: f64) -> i32 {
+    (REACH_SIGMAS * sigma / STEP) as i32
+}
+
+/// Number of registrations of a frame that the search takes in a survey of `frames`, for a prior of
+/// `sigma` (1-σ of ln f); 0 if nothing is searched for.
+pub fn focal_search_registrations(sigma: f64, frames: usize) -> usize {
+    match reach(sigma) {
+        0 => 0,
+        reach => (2 * reach as usize + 1) * first_frames(frames).len(),
+    }
 }
 
 /// Log-posterior of the second frame of a pair; one that does not fit deviates by as much as the
@@ -121,5 +135,8 @@ mod tests {
     #[test]
     fn a_focal_length_known_to_a_few_per_cent_is_not_searched_for() {
         assert_eq!(found(1.3, 0.02), 0.0);
+        assert_eq!(focal_search_registrations(0.02, 100), 0);
+        let pairs = first_frames(100).len();
+        assert_eq!(focal_search_registrations(0.3, 100), 25 * pairs);
     }
 }

@@ -18,6 +18,7 @@ pub mod maps;
 pub mod memory;
 pub mod panorama;
 pub mod panorama_files;
+pub mod panorama_progress;
 pub mod plan;
 pub mod preview;
 pub mod raster_target;

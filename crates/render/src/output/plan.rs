@@ -21,6 +21,9 @@ use tunnelstitch_core::progress::Progress;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
 
+/// Name of the stage in which bands are drawn.
+pub(super) const DRAWING: &str = "panorama";
+
 /// Exposures and seams, found before the first tile is drawn.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Settled {
@@ -185,7 +188,7 @@ impl<'a> Plan<'a> {
     ) -> Result<(), RenderError> {
         let starts: Vec<u32> = (0..self.canvas.rows).step_by(BAND_ROWS as usize).collect();
         let needs: Vec<Vec<usize>> = starts.par_map(|row| self.needed(frames, &self.tiles(*row)));
-        progress.start("panorama", starts.len());
+        progress.start(DRAWING, starts.len());
         progress.advance(first.min(starts.len()));
         let sources = targets.iter().any(|target| target.wants_sources());
         let empty = || Band::empty(&self.canvas, frames.format(), sources);

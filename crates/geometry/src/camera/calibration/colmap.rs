@@ -23,23 +23,36 @@ pub fn has_no_model(text: &str) -> bool {
 /// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixel coordinates are counted from the corner of
 /// the first pixel and converted.
 pub fn read(text: &str, name: Option<&str>) -> Result<Camera, ParseError> {
-    let cameras: Vec<_> = data_lines(text)
-        .map(|(number, line)| {
-            let id = line
-                .split_whitespace()
-                .next()
-                .unwrap_or_default()
-                .to_owned();
-            (id, (number, line))
-        })
-        .collect();
-    let (number, line) = select_camera(cameras, name)?;
-    camera(line).map_err(|what| ParseError::at(number, what))
+    let cameras = data_lines(text).map(|(number, line)| {
+        let mut words = line.split_whitespace();
+        let id = words.next().unwrap_or_default().to_owned();
+        (
+            id,
+            CameraLine {
+                number,
+                words: words.collect(),
+            },
+        )
+    });
+    let line = select_camera(cameras.collect(), name)?;
+    camera(&line.words).map_err(|what| ParseError::at(line.number, what))
 }
 
-fn camera(line: &str) -> Result<Camera, String> {
-    let words: Vec<&str> = line.split_whitespace().collect();
-    let [_, model, width, height, params @ ..] = &words[..] else {
+/// A camera's line without its id. COLMAP writes a camera for each picture unless it is told to
+/// share one: lines of the same words are one camera.
+struct CameraLine<'a> {
+    number: usize,
+    words: Vec<&'a str>,
+}
+
+impl PartialEq for CameraLine<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.words == other.words
+    }
+}
+
+fn camera(words: &[&str]) -> Result<Camera, String> {
+    let [model, width, height, params @ ..] = words else {
         return Err("a camera is `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`".to_owned());
     };
     let size = |word: &str| {

@@ -43,7 +43,7 @@ const MODELS: [(&str, usize); 18] = [
 /// Bytes of a camera without parameters.
 const MIN_CAMERA_BYTES: u64 = 24;
 
-/// A camera as the file has it.
+/// A camera as the file has it, without its id.
 struct CameraRecord {
     /// Position in the file, bytes.
     at: u64,
@@ -52,7 +52,13 @@ struct CameraRecord {
     params: Vec<f64>,
 }
 
-/// Reads one of the cameras; `name` is its id, and may be omitted if there is only one.
+impl PartialEq for CameraRecord {
+    fn eq(&self, other: &Self) -> bool {
+        (self.model, self.size, &self.params) == (other.model, other.size, &other.params)
+    }
+}
+
+/// Reads one of the cameras; `name` is its id, and may be omitted if all are equal.
 pub fn read(file: &mut BinaryFile, name: Option<&str>) -> Result<Camera, ParseError> {
     let unreadable = |error: io::Error| {
         ParseError::new(format!(

@@ -26,6 +26,16 @@ pub enum CalibrationError {
         /// The problem and the remedy.
         what: String,
     },
+    /// The file holds several cameras, and none is selected.
+    #[error("{}: {what}", printed(path))]
+    Several {
+        /// The file.
+        path: PathBuf,
+        /// The names of its cameras.
+        names: Vec<String>,
+        /// The names and the remedy in words.
+        what: String,
+    },
 }
 
 fn line_prefix(line: Option<usize>) -> String {
@@ -33,24 +43,26 @@ fn line_prefix(line: Option<usize>) -> String {
 }
 
 /// An error of a parser, with its line if known.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub(super) struct ParseError {
     pub line: Option<usize>,
     pub what: String,
+    /// The names of the cameras, if one of several is to be selected.
+    pub names: Vec<String>,
 }
 
 impl ParseError {
     pub fn new(what: impl Into<String>) -> Self {
         Self {
-            line: None,
             what: what.into(),
+            ..Self::default()
         }
     }
 
     pub fn at(line: usize, what: impl Into<String>) -> Self {
         Self {
             line: Some(line),
-            what: what.into(),
+            ..Self::new(what)
         }
     }
 }

@@ -95,7 +95,7 @@ pub fn read_toml(text: &str) -> Result<Camera, ParseError> {
         let before = error.span().map(|span| &text[..span.start.min(text.len())]);
         ParseError {
             line: before.map(|before| 1 + before.matches('\n').count()),
-            what: error.message().to_owned(),
+            ..ParseError::new(error.message())
         }
     })?;
     file.camera()

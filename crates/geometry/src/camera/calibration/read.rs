@@ -10,7 +10,7 @@ use super::{
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
-use crate::files::{BinaryFile, read_regular};
+use crate::files::{BinaryFile, decode_text, read_regular};
 use crate::recordings::is_recording;
 use std::path::Path;
 
@@ -45,10 +45,14 @@ pub fn read_calibration_of(
     name: Option<&str>,
     picture_size: PictureSize,
 ) -> Result<Camera, CalibrationError> {
-    let content = |error: ParseError| CalibrationError::Content {
-        path: path.to_owned(),
-        line: error.line,
-        what: error.what,
+    let content = |error: ParseError| {
+        let ParseError { line, what, names } = error;
+        let path = path.to_owned();
+        if names.is_empty() {
+            CalibrationError::Content { path, line, what }
+        } else {
+            CalibrationError::Several { path, names, what }
+        }
     };
     let unreadable = |source| CalibrationError::Read {
         path: path.to_owned(),
@@ -66,13 +70,12 @@ pub fn read_calibration_of(
         return camera.and_then(validate).map_err(content);
     }
     let bytes = read_regular(path, MAX_CALIBRATION_BYTES).map_err(unreadable)?;
-    let text = String::from_utf8(bytes).map_err(|_| {
-        content(ParseError::new(
-            "this is not a text file; give the calibration file itself",
-        ))
+    let text = decode_text(&bytes).map_err(|what| {
+        content(ParseError::new(format!(
+            "the file {what}; give the calibration itself"
+        )))
     })?;
-    let text = text.trim_start_matches('\u{feff}');
-    parse(text, &extension, name, picture_size)
+    parse(&text, &extension, name, picture_size)
         .and_then(validate)
         .map_err(content)
 }
@@ -82,8 +85,7 @@ pub fn read_calibration_of(
 /// other direction. `None` if there is none, or no such file.
 pub fn stated_readout_ms(path: &Path) -> Option<f64> {
     let bytes = read_regular(path, MAX_CALIBRATION_BYTES).ok()?;
-    let text = String::from_utf8(bytes).ok()?;
-    let tree = value_tree::parse_json(text.trim_start_matches('\u{feff}')).ok()?;
+    let tree = value_tree::parse_json(&decode_text(&bytes).ok()?).ok()?;
     gyroflow::is_profile(&tree)
         .then(|| gyroflow::readout_ms(&tree))
         .flatten()
@@ -120,6 +122,9 @@ fn parse(
             "OpenCV's XML is not supported; save the calibration as YAML (a name that ends in \
              .yml)",
         )),
+        _ if extension != "json" && !text.trim_start().starts_with(['{', '[']) => {
+            Err(unknown_calibration(""))
+        }
         _ => match value_tree::parse_json(text) {
             Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
             Ok(tree) if gyroflow::is_profile(&tree) => gyroflow::read(&tree),

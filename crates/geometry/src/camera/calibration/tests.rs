@@ -349,5 +349,5 @@ fn bad_files_say_where_and_what() {
     let path = dir.path().join("c.yml");
     std::fs::write(&path, [0xff, 0xfe, 0x00]).unwrap();
     let message = read_calibration(&path, None).unwrap_err().to_string();
-    assert!(message.contains("not a text file"), "{message}");
+    assert!(message.contains("no text of UTF-8"), "{message}");
 }

@@ -17,7 +17,7 @@ pub fn parse_yaml(text: &str) -> Result<Value, ParseError> {
         let what = what.lines().next().unwrap_or_default();
         ParseError {
             line,
-            what: format!("this is not valid YAML: {what}"),
+            ..ParseError::new(format!("this is not valid YAML: {what}"))
         }
     })?;
     if tree.is_object() {

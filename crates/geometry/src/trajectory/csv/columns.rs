@@ -129,14 +129,21 @@ impl Titles<'_> {
 
     fn missing(&self, column: PoseColumn) -> String {
         let name = column.name();
-        let known = match column {
-            PoseColumn::Tx | PoseColumn::Ty | PoseColumn::Tz => format!("`{name}_m` or `{name}`"),
-            _ => format!("`{name}`"),
+        let is_rotation = matches!(name.as_bytes(), [b'q', _]);
+        let known = match is_rotation {
+            true => format!("`{name}`"),
+            false => format!("`{name}_m` or `{name}`"),
+        };
+        let remedy = if is_rotation && self.titles.iter().any(Title::is_angle) {
+            "angles are not read, since programs differ in their order and axes; write the \
+             rotation as a quaternion qx, qy, qz, qw (Rotation.from_euler of SciPy makes it)"
+                .to_owned()
+        } else {
+            format!("if it has another name, say so with {}", remedy(column))
         };
         format!(
-            "no column {known}; the columns are {}; if it has another name, say so with {}",
-            self.listed(),
-            remedy(column)
+            "no column {known}; the columns are {}; {remedy}",
+            self.listed()
         )
     }
 

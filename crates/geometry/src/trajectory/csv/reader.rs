@@ -60,8 +60,13 @@ impl RowReader {
     fn read(&self, line: &str) -> Result<PoseEntry, String> {
         let record = split(line, self.separator)?;
         if record.len() != self.count {
+            let remedy = if self.separator == b',' && record.len() > self.count {
+                "; where numbers have decimal commas, semicolons or tabs must separate them"
+            } else {
+                ""
+            };
             return Err(format!(
-                "{} columns where the first line names {}",
+                "{} columns where the first line names {}{remedy}",
                 record.len(),
                 self.count
             ));
@@ -149,6 +154,23 @@ mod tests {
         let read = parse(Path::new("p.csv"), &text).unwrap();
         let read: Vec<String> = read.into_iter().filter_map(|entry| entry.name).collect();
         assert_eq!(read, names);
+    }
+
+    /// Angles cannot be read, and decimal commas between commas not either.
+    #[test]
+    fn what_a_table_lacks_is_named_with_what_helps() {
+        let error = |text: &str| parse(Path::new("p.csv"), text).unwrap_err().to_string();
+        let said = error("tx,ty,tz,roll,pitch,yaw\n0,0,0,0,0,0\n");
+        assert!(said.starts_with("p.csv:1: no column `qx`"), "{said}");
+        assert!(
+            said.contains("a quaternion") && !said.contains("--pose-columns"),
+            "{said}"
+        );
+        let said = error("tx,ty,tz,qx,qy,qz,qw\n0,5,0,5,0,5,0,5,0,5,0,5,0,5\n");
+        assert!(
+            said.contains(":2: 14 columns") && said.contains("semicolons"),
+            "{said}"
+        );
     }
 
     #[test]

@@ -23,6 +23,10 @@ const TIMES_NS: &[&str] = &["time_ns", "timestamp_ns"];
 /// `pose.pose.position.x`.
 const TRANSLATIONS: &[&str] = &["position", "translation", "pos"];
 const ROTATIONS: &[&str] = &["orientation", "rotation", "quaternion", "quat"];
+/// Names of angles about an axis.
+const ANGLES: &[&str] = &[
+    "roll", "pitch", "yaw", "heading", "omega", "phi", "kappa", "rx", "ry", "rz",
+];
 
 /// The title of a column: its name in lower case, with `_` for other separators of words, and its
 /// unit.
@@ -85,6 +89,11 @@ impl Title {
             .any(|end| self.name.ends_with(end))
     }
 
+    /// True for an angle about an axis, such as `roll_deg` or `pose.yaw`.
+    pub fn is_angle(&self) -> bool {
+        self.name.split('_').any(|word| ANGLES.contains(&word))
+    }
+
     fn rank_of_translation(&self, axis: &str) -> Option<usize> {
         if !["", "m", "metres", "meters"].contains(&self.unit.as_str()) {
             return None;
@@ -128,6 +137,16 @@ impl Title {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn angles_are_told_from_other_columns() {
+        for text in ["roll", "Yaw [deg]", "pose.pitch", "omega_rad", "rx"] {
+            assert!(Title::of(text).is_angle(), "{text}");
+        }
+        for text in ["qx", "x", "time", "rolled"] {
+            assert!(!Title::of(text).is_angle(), "{text}");
+        }
+    }
 
     #[test]
     fn names_of_ros_and_euroc_are_known() {
