@@ -147,9 +147,10 @@ impl FrameFile {
 
     /// The error of a picture file that the decoder refuses.
     pub(super) fn picture_error(&self, error: &ImageError) -> FrameError {
-        let size = std::fs::metadata(self.file()).map_or(1, |metadata| metadata.len());
+        let is_empty = std::fs::metadata(self.file())
+            .is_ok_and(|metadata| metadata.is_file() && metadata.len() == 0);
         match error {
-            _ if size == 0 => self.decode_error("the file is empty".to_owned()),
+            _ if is_empty => self.decode_error("the file is empty".to_owned()),
             ImageError::Unsupported(error) if error.format_hint() == ImageFormatHint::Unknown => {
                 self.decode_error("it is no picture of a known format".to_owned())
             }

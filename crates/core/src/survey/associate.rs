@@ -67,6 +67,9 @@ pub(super) fn by_order(
                 "; or associate them by name (--associate name)"
             } else if file.has_times() && (times_s.is_some() || from_names(frames).is_ok()) {
                 "; or associate them by time (--associate time)"
+            } else if file.has_times() {
+                "; or associate them by time (--associate time), with a list of the frames' times \
+                 (--frame-times FILE)"
             } else {
                 ""
             },
