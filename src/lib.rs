@@ -107,8 +107,9 @@
 //! let refined = refine(&survey, &RefineOptions::default(), &silent)?;
 //!
 //! let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
+//! let surface = survey.surface.as_ref();
 //! let off = |poses: &[_]| {
-//!     wall_error(survey.surface.as_ref(), &survey.cameras, poses, &truth).map(|error| error.px.rms)
+//!     wall_error(surface, &survey.cameras, poses, &truth).map(|error| error.px.rms)
 //! };
 //! assert!(off(&survey.initial_poses())? > 10.0);
 //! assert!(off(&poses_of(&refined.trajectory))? < 0.1);

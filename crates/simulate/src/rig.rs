@@ -17,8 +17,8 @@ const FOCAL_STEP: f64 = 0.004;
 /// Principal point of a camera less that of the one before it, shares of the width and height.
 const CENTRE_STEP: [f64; 2] = [0.004, -0.003];
 
-/// Several cameras, spread by equal angles about the y axis of the first: that of the carrier, if it
-/// looks at the wall beside it.
+/// Several cameras, spread by equal angles about the y axis of the first: that of the carrier, if
+/// it looks at the wall beside it.
 ///
 /// The body of the rig has the pose that a single camera would have.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

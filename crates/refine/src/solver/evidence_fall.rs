@@ -27,8 +27,8 @@ pub struct EvidenceFall {
 
 impl EvidenceFall {
     /// The strength within `[least_m, most_m]` at which the evidence has fallen by `wanted`, or
-    /// `most_m`; None if it cannot be evaluated. `fall`: the fall at a strength, metres. Values that
-    /// it gave for another amount are not asked for again.
+    /// `most_m`; None if it cannot be evaluated. `fall`: the fall at a strength, metres. Values
+    /// that it gave for another amount are not asked for again.
     pub fn strength_m(
         &mut self,
         wanted: f64,
