@@ -233,6 +233,7 @@ fn small(wall: Wall, noise_grey: f64) -> SimulateOptions {
         camera: Camera::from_vertical_fov(320, 240, 60f64.to_radians()),
         wall,
         noise_grey,
+        supersample: 4,
         ..SimulateOptions::free()
     }
 }

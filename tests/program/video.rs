@@ -51,7 +51,7 @@ const ENTANGLED: [&str; 12] = [
 /// Two turns of a brick tunnel in small frames.
 fn simulated(folder: &Path) -> PathBuf {
     let out = folder.join("survey");
-    let options = ["--turns", "2", "--size", "240x180", "--supersample", "3"];
+    let options = ["--turns", "2", "--size", "192x144", "--supersample", "3"];
     simulate(&out, &options);
     out
 }
@@ -198,7 +198,7 @@ fn every_command_takes_a_video() {
     let folder = text(&survey);
     let said = succeed(&["init", folder, "--radius-m", "3"]);
     assert!(
-        said.contains("survey.mp4 (24 pictures, 240 × 180 px)") && said.contains("next: "),
+        said.contains("survey.mp4 (24 pictures, 192 × 144 px)") && said.contains("next: "),
         "{said}"
     );
     let out = |name: &str| survey.join(name).to_str().unwrap().to_owned();
