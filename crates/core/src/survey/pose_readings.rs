@@ -135,7 +135,7 @@ impl Survey {
         });
         let lenses = self.other_focal_lengths(&as_given);
         let others = poses
-            .chain(self.other_radii())
+            .chain(self.other_radii(given.format))
             .chain(pictures)
             .chain(lenses);
         Ok(std::iter::once(as_given.clone()).chain(others).collect())
@@ -161,13 +161,13 @@ impl Survey {
     }
 
     /// Readings of a straight round tunnel with another radius. Pictures of it are those of the
-    /// given one, seen from positions that are scaled about its axis.
-    fn other_radii(&self) -> impl Iterator<Item = PoseReading> {
+    /// given one, seen from positions that are scaled about its axis. Poses without a scale say
+    /// nothing of it.
+    fn other_radii(&self, format: PoseFormat) -> impl Iterator<Item = PoseReading> {
         let tunnel = &self.file.tunnel;
-        let is_straight = tunnel.centreline.is_none();
-        let radius_m = tunnel
-            .radius_m
-            .filter(|_| is_straight && self.bend.is_none());
+        let is_straight = tunnel.centreline.is_none() && self.bend.is_none();
+        let has_scale = self.file.poses.unit_m.is_some() || !format.has_no_scale();
+        let radius_m = tunnel.radius_m.filter(|_| is_straight && has_scale);
         let factors = RADIUS_FACTORS.into_iter();
         factors.filter_map(move |(factor, given)| {
             let radius_m = factor * radius_m?;
@@ -260,5 +260,19 @@ mod tests {
         let wrong = UnitQuaternion::from_quaternion(Quaternion::new(z, w, x, y));
         let read = with_w_first(&Pose::new(wrong, Vector3::zeros()));
         assert!(read.r_wc.angle_to(&right) < 1e-12);
+    }
+
+    /// A model of structure from motion has any size, whatever the radius.
+    #[test]
+    fn poses_without_a_scale_say_nothing_of_the_radius() {
+        let fixture = std::path::Path::new("../../fixtures/blender_free48");
+        let survey = Survey::open(fixture).unwrap();
+        let radii = |format| survey.other_radii(format).count();
+        assert_eq!(radii(PoseFormat::Tum), RADIUS_FACTORS.len());
+        assert_eq!(radii(PoseFormat::Colmap), 0);
+        let change = |file: &mut crate::survey::SurveyFile| file.poses.unit_m = Some(1.0);
+        let with_unit = Survey::open_with(fixture, change).unwrap();
+        let count = with_unit.other_radii(PoseFormat::Colmap).count();
+        assert_eq!(count, RADIUS_FACTORS.len());
     }
 }
