@@ -20,7 +20,7 @@ const PANORAMAS_OF_REPORT: f64 = 2.0;
 /// Processor time of starting the program, seconds.
 const START_S: f64 = 1.0;
 /// Memory of the program beside what it works on, bytes.
-const PROGRAM_BYTES: u64 = 128 << 20;
+const PROGRAM_BYTES: u64 = 192 << 20;
 /// Memory for parts of a panorama and pictures of frames, bytes.
 const PANORAMA_BYTES: u64 = 512 << 20;
 /// Times that a task may take as long as expected, which is right within a factor of three or so,
