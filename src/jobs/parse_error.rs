@@ -1,17 +1,17 @@
 //! Errors of parsers, with their place in the file.
 
 use super::error::JobError;
+use crate::files::line_and_column;
 use std::path::Path;
 
 /// The error of a TOML file of this content.
 pub fn of_toml(path: &Path, text: &str, error: &toml::de::Error) -> JobError {
-    let at = error.span().map_or(0, |span| span.start.min(text.len()));
-    let before = &text.as_bytes()[..at];
-    let line_start = before.iter().rposition(|byte| *byte == b'\n');
+    let at = error.span().map_or(0, |span| span.start);
+    let [line, column] = line_and_column(text, at);
     JobError::Parse {
         path: path.to_owned(),
-        line: 1 + before.iter().filter(|byte| **byte == b'\n').count(),
-        column: at - line_start.map_or(0, |newline| newline + 1) + 1,
+        line,
+        column,
         what: error.message().replace('\n', " "),
     }
 }

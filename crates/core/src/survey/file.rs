@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::files::limits::MAX_SURVEY_BYTES;
-use tunnelstitch_geometry::files::read_text;
+use tunnelstitch_geometry::files::{line_and_column, read_text};
 use tunnelstitch_geometry::trajectory::{Jitter, JitterModel};
 
 /// Name of the file that describes a survey.
@@ -186,14 +186,8 @@ pub(super) fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
         source,
     })?;
     toml::from_str(&text).map_err(|error| {
-        let at = error.span().map_or(0, |span| span.start.min(text.len()));
-        let before = &text.as_bytes()[..at];
-        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
-        let column = 1 + before
-            .iter()
-            .rev()
-            .take_while(|byte| **byte != b'\n')
-            .count();
+        let at = error.span().map_or(0, |span| span.start);
+        let [line, column] = line_and_column(&text, at);
         SurveyError::Parse {
             path: path.to_owned(),
             line,

@@ -8,6 +8,7 @@
 //! | encodings of text files | [`encoding`] |
 //! | numbers of JSON files | [`json`] |
 //! | largest sizes of text files | [`limits`] |
+//! | lines and columns of texts | [`place`] |
 //! | files that are locked or appended to, and targets that may be replaced | [`targets`] |
 //! | elements of XML files | [`xml`] |
 //! | names and texts without control characters | [`printed()`] |
@@ -16,6 +17,7 @@ pub mod binary;
 pub mod encoding;
 pub mod json;
 pub mod limits;
+pub mod place;
 pub mod printed;
 pub mod regular;
 pub mod targets;
@@ -23,6 +25,7 @@ pub mod xml;
 
 pub use binary::BinaryFile;
 pub use encoding::decode_text;
+pub use place::line_and_column;
 pub use printed::{escape_controls, printed};
 pub use regular::{open_regular, read_regular, read_text};
 pub use targets::{check_replaceable_file, open_without_links, write_without_links};
