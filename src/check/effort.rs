@@ -36,8 +36,9 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// Estimates the effort from the number and the size of the frames.
-    pub(super) fn of(survey: &Survey, px_per_metre: f64) -> Self {
+    /// Estimates the effort from the number and the size of the frames; `px_per_metre`: their
+    /// resolution at the wall.
+    pub fn of(survey: &Survey, px_per_metre: f64) -> Self {
         let poses = || survey.initial.iter().map(|stamped| stamped.pose.t_wc);
         let chainage = || poses().map(|t_wc| survey.surface.chainage_m(&t_wc));
         let from_m = chainage().fold(f64::INFINITY, f64::min);

@@ -1,9 +1,9 @@
 //! `job.json`: the graph of tasks.
 
 use super::error::JobError;
-use super::parse_error;
+use super::text_file;
 use crate::files::{printed, read_text};
-use crate::persist::atomic::{self, WriteError};
+use crate::persist::atomic::WriteError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -117,7 +117,7 @@ impl Job {
             remedy: "; a job is a folder that tunnelstitch plan-job has written",
         })?;
         let job: Self =
-            serde_json::from_str(&text).map_err(|error| parse_error::of_json(&path, &error))?;
+            serde_json::from_str(&text).map_err(|error| text_file::json_error(&path, &error))?;
         job.validate()
             .map_err(|what| JobError::Value { path, what })?;
         Ok(job)
@@ -128,11 +128,7 @@ impl Job {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
-        let path = folder.join(JOB_FILE);
-        atomic::write(&path, |writer| {
-            serde_json::to_writer_pretty(&mut *writer, self)?;
-            std::io::Write::write_all(writer, b"\n")
-        })
+        text_file::write_json(&folder.join(JOB_FILE), self)
     }
 
     /// The task of this identifier.

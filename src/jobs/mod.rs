@@ -21,7 +21,6 @@
 mod error;
 mod job;
 mod network;
-mod parse_error;
 mod plan;
 mod process;
 mod run_job;
@@ -29,6 +28,7 @@ mod run_task;
 mod schedule;
 mod task_key;
 mod task_record;
+mod text_file;
 
 pub use error::JobError;
 pub use job::{JOB_FILE, Job, Needs, Step, Task};

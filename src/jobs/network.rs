@@ -1,7 +1,7 @@
 //! `network.toml`: the sections of a network of tunnels, each with its survey.
 
 use super::error::JobError;
-use super::parse_error;
+use super::text_file;
 use crate::files::read_text;
 use crate::survey::toml_path;
 use serde::Deserialize;
@@ -51,12 +51,12 @@ impl Network {
             remedy: "; give a network.toml, or a survey",
         })?;
         let content: toml::Table =
-            toml::from_str(&text).map_err(|error| parse_error::of_toml(path, &text, &error))?;
+            toml::from_str(&text).map_err(|error| text_file::toml_error(path, &text, &error))?;
         if content.contains_key("tunnel") {
             return Self::of_survey(path);
         }
         let file: NetworkFile =
-            toml::from_str(&text).map_err(|error| parse_error::of_toml(path, &text, &error))?;
+            toml::from_str(&text).map_err(|error| text_file::toml_error(path, &text, &error))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let sections = file.section.into_iter().map(|section| Section {
             survey: folder.join(&section.survey),

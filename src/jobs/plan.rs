@@ -3,7 +3,7 @@
 use super::error::JobError;
 use super::job::{Job, Needs, Step, Task};
 use super::network::{Network, Section};
-use crate::check::{refine_bytes, refine_processor_s};
+use crate::check::{Effort, refine_processor_s};
 use crate::files::printed;
 use crate::refine::RefineOptions;
 use crate::render::native_px_per_metre;
@@ -144,20 +144,14 @@ struct Work {
 impl Work {
     fn of(survey: &Survey) -> Self {
         let surface = survey.surface.as_ref();
-        let chainages = || {
-            let poses = survey.initial.iter();
-            poses.map(|stamped| surface.chainage_m(&stamped.pose.t_wc))
-        };
-        let length_m = chainages().fold(f64::NEG_INFINITY, f64::max)
-            - chainages().fold(f64::INFINITY, f64::min);
-        // A camera that shows no wall makes no panorama: refining says so.
+        // Cameras that show no wall make no panorama: refining says so.
         let px_per_metre = native_px_per_metre(surface, &survey.cameras, &survey.initial_poses());
-        let px_per_metre = px_per_metre.unwrap_or_default();
-        let height = length_m * px_per_metre + f64::from(survey.cameras.size()[1]);
+        let effort = Effort::of(survey, px_per_metre.unwrap_or_default());
+        let [width, height] = effort.panorama_px;
         Self {
             refine_s: refine_processor_s(survey, &RefineOptions::default()),
-            refine_bytes: refine_bytes(survey),
-            panorama_px: surface.perimeter_m() * px_per_metre * height,
+            refine_bytes: effort.refine_bytes,
+            panorama_px: width as f64 * height as f64,
         }
     }
 
@@ -193,10 +187,7 @@ fn inputs_of(survey: &Survey, folder: &Path) -> Result<Vec<PathBuf>, JobError> {
             None => {
                 let frames = frame.path.parent().unwrap_or(Path::new("."));
                 let from = from_folder(frames, folder)?;
-                if from
-                    .components()
-                    .all(|part| part == std::path::Component::ParentDir)
-                {
+                if from.components().all(|part| part == Component::ParentDir) {
                     return Err(JobError::Value {
                         path: folder.to_owned(),
                         what: format!(

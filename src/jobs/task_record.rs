@@ -2,10 +2,10 @@
 
 use super::error::JobError;
 use super::job::Task;
-use super::parse_error;
 use super::process::Usage;
+use super::text_file;
 use crate::files::read_text;
-use crate::persist::atomic::{self, WriteError};
+use crate::persist::atomic::WriteError;
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -53,7 +53,7 @@ impl TaskRecord {
         let record = serde_json::from_str(&text);
         record
             .map(Some)
-            .map_err(|error| parse_error::of_json(&path, &error))
+            .map_err(|error| text_file::json_error(&path, &error))
     }
 
     /// Writes the record.
@@ -61,10 +61,7 @@ impl TaskRecord {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, folder: &Path, task: &Task) -> Result<(), WriteError> {
-        atomic::write(&record_path(folder, task), |writer| {
-            serde_json::to_writer_pretty(&mut *writer, self)?;
-            std::io::Write::write_all(writer, b"\n")
-        })
+        text_file::write_json(&record_path(folder, task), self)
     }
 }
 

@@ -80,7 +80,7 @@ impl FoundCalibration {
 mod tests {
     use super::*;
 
-    /// COLMAP writes a camera for each picture, unless it is told to share one.
+    /// COLMAP writes a camera for each picture, unless a single one is asked for.
     #[test]
     fn one_of_several_cameras_is_selected() {
         let dir = tempfile::tempdir().unwrap();

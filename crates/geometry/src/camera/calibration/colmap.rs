@@ -38,7 +38,7 @@ pub fn read(text: &str, name: Option<&str>) -> Result<Camera, ParseError> {
     camera(&line.words).map_err(|what| ParseError::at(line.number, what))
 }
 
-/// A camera's line without its id. COLMAP writes a camera for each picture unless it is told to
+/// A camera's line without its id. COLMAP writes a camera for each picture unless asked to
 /// share one: lines of the same words are one camera.
 struct CameraLine<'a> {
     number: usize,
