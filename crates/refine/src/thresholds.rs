@@ -54,7 +54,8 @@ pub mod tracking {
     /// Chosen by: unknown.
     pub const LONG_WINDOW_FRAMES: usize = 160;
 
-    /// Number of frames that fit nowhere, from the beginning, after which no others are tried.
+    /// Number of frames that do not match the others as right ones do, from the beginning, after
+    /// which no others are tried.
     ///
     /// Higher: surveys that cannot be refined take longer.
     ///

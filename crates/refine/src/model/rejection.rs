@@ -69,7 +69,7 @@ pub enum RejectionReason {
     },
     /// The equations of the survey have no solution.
     Unsolved,
-    /// It was not tried, as none of those before it fitted.
+    /// It was not tried, as none of those before it matched.
     NotTried {
         /// Number of frames that were tried.
         failures: usize,
@@ -170,7 +170,7 @@ impl fmt::Display for RejectionReason {
             Self::NotTried { failures } => write!(
                 f,
                 "it was not tried: {failures} frames from the beginning were searched for over \
-                 3.5 σ of the prior in all directions, and none fitted the others"
+                 3.5 σ of the prior in all directions, and none matched the others as right ones do"
             ),
             Self::Minority { frames: 1, .. } => write!(f, "it fits no other frame"),
             Self::Minority { frames, shown } => write!(

@@ -57,7 +57,8 @@ impl AlternatingCalibration {
     }
 
     /// Tracks the first frames and corrects the shading, if there is one, where they overlap; false
-    /// if that does not settle: the light is no shading that all frames have in common.
+    /// if they do not match each other, or if that does not settle: the light is no shading that
+    /// all frames have in common.
     fn correct_shading(
         &mut self,
         context: &EstimationContext,
@@ -77,6 +78,9 @@ impl AlternatingCalibration {
                 progress.advance(1);
             }
             progress.finish();
+            if self.tracking.is_hopeless() {
+                return Ok(false);
+            }
             let mut states = self.tracking.tracked_states();
             let context = context.at(states.kappa);
             let observed = correct_until_settled(&context, options, &mut states)?;

@@ -42,8 +42,8 @@ pub struct Tracking {
     kappa: Kappa,
     /// Frames that were registered on others, or were tried to.
     attempts: usize,
-    /// Those of them that fitted.
-    successes: usize,
+    /// Those of them that matched as well as right poses do.
+    matches: usize,
     /// The effort that is left for registrations.
     effort: Effort,
     /// Frames tracked since the last sliding window.
@@ -65,7 +65,7 @@ impl Tracking {
             earliest_overlaps: Vec::new(),
             kappa,
             attempts: 0,
-            successes: 0,
+            matches: 0,
             effort: Effort::default(),
             frames_since_window: 0,
             was_reliable: true,
@@ -77,9 +77,9 @@ impl Tracking {
         self.states.estimates.len()
     }
 
-    /// True if so many frames fitted nowhere, and none fitted, that no others will.
-    fn is_hopeless(&self) -> bool {
-        self.successes == 0 && self.attempts >= MAX_FAILURES
+    /// True if so many frames did not match, and none did, that no others will.
+    pub fn is_hopeless(&self) -> bool {
+        self.matches == 0 && self.attempts >= MAX_FAILURES
     }
 
     /// True if all frames are tracked.
@@ -213,7 +213,7 @@ impl Tracking {
                 is_reliable,
                 ..
             }) => {
-                self.successes += 1;
+                self.matches += usize::from(is_reliable);
                 states.estimates[k] = estimate;
                 Ok(is_reliable)
             }
