@@ -42,10 +42,32 @@ fn a_diameter_given_for_the_radius_is_named() {
     assert!(message.contains("diameter"), "{message}");
     let report = json(&out.join("refine.json"));
     assert_eq!(report["verdict"]["photometric"], 0);
+    // The light is not at fault.
+    assert_eq!(report["photometry"], "model");
     let kept = poses(&out.join("poses.tum"));
     for (kept, initial) in kept.iter().zip(poses(&survey.join("baseline.tum"))) {
         assert!(initial.pose.local(&kept.pose).norm() < 1e-8);
     }
+}
+
+/// What is left of bricks correlates, but not as it should.
+#[test]
+fn a_survey_in_which_nothing_matches_ends_early() {
+    let dir = tempfile::tempdir().unwrap();
+    let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
+    simulate(
+        &survey,
+        &["--frames", "20", "--size", "160x120", "--seed", "3"],
+    );
+    for frame in survey.join("frames").read_dir().unwrap() {
+        let path = frame.unwrap().path();
+        image::open(&path).unwrap().blur(8.0).save(&path).unwrap();
+    }
+    let message = fail(&["refine", text(&survey), "--out", text(&out)], 4);
+    assert!(message.contains("it was not tried"), "{message}");
+    let report = json(&out.join("refine.json"));
+    assert_eq!(report["verdict"]["photometric"], 0);
+    assert!(report["levels"].as_array().unwrap().is_empty());
 }
 
 /// A principal point 1.5 px off that is not estimated: the poses are a little wrong, and σ says by

@@ -6,13 +6,13 @@
 
 use crate::error::RefineError;
 use crate::input::RefineInput;
+use crate::model::frame_states::majority;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::options::{Photometry, RefineOptions};
 use crate::refined::Refined;
 use crate::stages::assess::without_solution;
 use crate::stages::begin::begin;
-use crate::stages::plan::Stage;
 use crate::stages::run::run_stage;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
@@ -124,7 +124,7 @@ fn run_stages(
             Err(RefineError::Problem(ProblemError::Factor { .. })) => None,
             Err(error) => return Err(error),
         };
-        let fits = ended.as_ref().is_some_and(|ended| fits_light(stage, ended));
+        let fits = ended.as_ref().is_some_and(fits_light);
         estimation = match ended {
             _ if !fits && may_normalise(setup) => {
                 let light = setup.frames.camera_light();
@@ -138,9 +138,23 @@ fn run_stages(
                 hidden_bands: Some(bands),
                 ..
             }) => return Ok(Outcome::Hidden(bands)),
-            Some(ended) => ended.without_first_stage(),
-            // Poses that nothing determines are those given.
-            None => return Ok(Outcome::Refined(Box::new(without_solution(setup, session)))),
+            Some(ended) => match majority(&ended.state.frames.rejections) {
+                // No later stage registers frames on a minority.
+                Err(reason) if ended.refined.is_none() => {
+                    let rejections = ended.state.frames.rejections;
+                    return Ok(unsolved(setup, session, &reason, rejections));
+                }
+                _ => ended.without_first_stage(),
+            },
+            None => {
+                let rejections = vec![None; setup.count()];
+                return Ok(unsolved(
+                    setup,
+                    session,
+                    &RejectionReason::Unsolved,
+                    rejections,
+                ));
+            }
         };
     }
     let refined = estimation.refined.ok_or(RefineError::NoOverlap)?;
@@ -153,20 +167,28 @@ fn may_normalise(setup: &Setup) -> bool {
         && !matches!(setup.frames.light(), Light::Normalised)
 }
 
-/// True if the light of most frames that show something fits the model, as far as the stage that
-/// has ended tells: a shading explains it, they could be registered, or, at the end, are
-/// photometric.
-fn fits_light(stage: Stage, ended: &Estimation) -> bool {
+/// True if the light of most frames that show something fits the model, as far as they tell: a
+/// shading explains it and they are inliers, or, at the end, are photometric. Where they contradict
+/// the lengths of the prior they fit each other.
+fn fits_light(ended: &Estimation) -> bool {
     if !ended.state.has_common_light {
         return false;
     }
-    if let Some(refined) = &ended.refined {
-        return refined.report.frames_on_prior * 2 <= refined.report.frames.len();
-    }
-    let rejections = &ended.state.frames.rejections;
-    let shown = rejections
-        .iter()
-        .filter(|reason| !reason.as_ref().is_some_and(RejectionReason::shows_nothing));
-    let registered = rejections.iter().filter(|reason| reason.is_none()).count();
-    stage != Stage::Track || 2 * registered >= shown.count()
+    let Some(refined) = &ended.refined else {
+        return ended.state.frames.has_majority();
+    };
+    let report = &refined.report;
+    report.frames_on_prior * 2 <= report.frames.len()
+        || report.prior_test.contradicting_scale().is_some()
+}
+
+/// The end without a solution: poses that nothing determines are those given.
+fn unsolved(
+    setup: &Setup,
+    session: &mut Session,
+    reason: &RejectionReason,
+    rejections: Vec<Option<RejectionReason>>,
+) -> Outcome {
+    let refined = without_solution(setup, session, reason, rejections);
+    Outcome::Refined(Box::new(refined))
 }

@@ -3,26 +3,40 @@
 use super::comparison::Registrations;
 use crate::error::RefineError;
 use crate::input::RefineInput;
+use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::stages::setup::Setup;
 use crate::tracking::neighbour_pairs::register_pairs;
-use crate::tracking::prescreening::prescreen;
+use crate::tracking::prescreening::{Prescreened, prescreen};
 use crate::tracking::registration::Registered;
 use image::DynamicImage;
-use std::collections::BTreeMap;
-use tunnelstitch_core::frames::{FrameSet, Light, load_colour};
+use tunnelstitch_core::frames::{FrameCache, FrameSet, Light, PictureOrientation, load_colour};
 use tunnelstitch_core::progress::Silent;
 use tunnelstitch_core::survey::{PoseReading, Survey};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::trajectory::StampedPose;
 
-/// The pictures of pairs of neighbouring frames, as read.
+/// The pictures of pairs of neighbouring frames.
 pub struct PicturePairs<'s> {
     survey: &'s Survey,
-    /// The pictures by the indices of their frames.
-    pictures: BTreeMap<usize, DynamicImage>,
+    /// The frames of the pairs, in order.
+    frames: Vec<usize>,
+    /// The places of the pairs' first frames among these.
+    firsts: Vec<usize>,
+    /// The pictures as read.
+    pictures: Vec<DynamicImage>,
+    /// The pictures as the last reading turns them.
+    turned: Option<TurnedPictures>,
+}
+
+/// The pictures as readings of one orientation turn them, decoded and normalised once.
+struct TurnedPictures {
+    orientation: PictureOrientation,
+    files: FrameSet,
+    cache: FrameCache,
+    prescreened: Prescreened,
 }
 
 impl<'s> PicturePairs<'s> {
@@ -37,56 +51,89 @@ impl<'s> PicturePairs<'s> {
         let files: Vec<_> = chosen.iter().collect();
         let pictures = files.par_map(|file| load_colour(file, width, height));
         let pictures: Result<Vec<_>, _> = pictures.into_iter().collect();
-        let pictures = pictures.map_err(ProblemError::from)?;
+        let place = |first: &usize| frames.partition_point(|k| k < first);
         Ok(Self {
             survey,
-            pictures: frames.into_iter().zip(pictures).collect(),
+            firsts: firsts.iter().map(place).collect(),
+            frames,
+            pictures: pictures.map_err(ProblemError::from)?,
+            turned: None,
         })
     }
 
-    /// Registers the frames after `firsts` on the wall that each of these shows, as long as
+    /// Registers the second frame of each pair on the wall that the first one shows, as long as
     /// `is_wanted` of those before.
     ///
     /// # Errors
     /// [`RefineError`].
     pub fn register(
-        &self,
+        &mut self,
         reading: &PoseReading,
-        firsts: &[usize],
         is_wanted: impl Fn(&[Option<Registered>]) -> bool,
     ) -> Result<Registrations, RefineError> {
-        let wanted = frames_of(firsts);
-        let turned = |k: &usize| reading.orientation.turned(&self.pictures[k]);
-        let mut frames = FrameSet::in_memory(wanted.iter().map(turned));
-        if let Some(mask) = self.survey.frames.masks().of(0) {
-            frames.hide(mask);
-        }
-        let initial: Vec<StampedPose> = wanted.iter().map(|k| reading.initial[*k]).collect();
+        let initial: Vec<StampedPose> = self.frames.iter().map(|k| reading.initial[*k]).collect();
         let options = RefineOptions {
             // Only the poses.
             calibrate: Some(Vec::new()),
             ..RefineOptions::fast()
         };
+        let before = self.turned.take();
+        let turned = match before.filter(|before| before.orientation == reading.orientation) {
+            Some(turned) => turned,
+            None => self.turn(reading, &initial, &options)?,
+        };
+        let setup = self.setup(&turned.files, reading, &initial, &options)?;
+        let context = EstimationContext {
+            frames: &turned.cache,
+            ..setup.initial_context(turned.prescreened.noise)
+        };
+        let rejections = turned.prescreened.rejections.clone();
+        let states = FrameStates::at(&setup.prior.initial, rejections);
+        let registered = register_pairs(&context, &options, &states, &self.firsts, is_wanted)?;
+        self.turned = Some(turned);
+        Ok(registered)
+    }
+
+    /// The pictures as a reading turns them.
+    fn turn(
+        &self,
+        reading: &PoseReading,
+        initial: &[StampedPose],
+        options: &RefineOptions,
+    ) -> Result<TurnedPictures, RefineError> {
+        let turned = |picture| reading.orientation.turned(picture);
+        let mut files = FrameSet::in_memory(self.pictures.iter().map(turned));
+        if let Some(mask) = self.survey.frames.masks().of(0) {
+            files.hide(mask);
+        }
+        let setup = self.setup(&files, reading, initial, options)?;
+        // No light is known yet.
+        setup.frames.set_light(Light::Normalised);
+        let prescreened = prescreen(&setup.initial_context(0.0), setup.coarsest_level(), &Silent)?;
+        Ok(TurnedPictures {
+            orientation: reading.orientation,
+            cache: setup.frames,
+            files,
+            prescreened,
+        })
+    }
+
+    /// The refinement of the pairs in a reading.
+    fn setup<'a>(
+        &'a self,
+        frames: &'a FrameSet,
+        reading: &PoseReading,
+        initial: &'a [StampedPose],
+        options: &'a RefineOptions,
+    ) -> Result<Setup<'a>, RefineError> {
         let input = RefineInput {
             cameras: reading.camera(self.survey.cameras.of(0)).into(),
-            frames: &frames,
-            initial: &initial,
+            frames,
+            initial,
             pose_gaps: &[],
             ..RefineInput::from(self.survey)
         };
-        let setup = Setup::new(input, &options)?;
-        // No light is known yet.
-        setup.frames.set_light(Light::Normalised);
-        let firsts: Vec<usize> = firsts
-            .iter()
-            .map(|first| wanted.partition_point(|k| k < first))
-            .collect();
-        let prescreened = prescreen(&setup.initial_context(0.0), setup.coarsest_level(), &Silent)?;
-        let context = setup.initial_context(prescreened.noise);
-        let states = FrameStates::at(&setup.prior.initial, prescreened.rejections);
-        Ok(register_pairs(
-            &context, &options, &states, &firsts, is_wanted,
-        )?)
+        Setup::new(input, options)
     }
 }
 

@@ -84,16 +84,16 @@ fn among_all_pairs<'r>(
     if firsts.len() < MIN_PAIRS {
         return Ok(Vec::new());
     }
-    let pictures = PicturePairs::load(survey, &firsts)?;
+    let mut pictures = PicturePairs::load(survey, &firsts)?;
     let comparison = Comparison {
-        of_given: pictures.register(given, &firsts, |_| true)?,
+        of_given: pictures.register(given, |_| true)?,
         telling: vec![true; firsts.len()],
         least_nats,
         min_pair_nats: 0.0,
     };
     let mut found = Vec::new();
     for reading in others {
-        found.extend(compare(&pictures, &firsts, &comparison, reading)?);
+        found.extend(compare(&mut pictures, &comparison, reading)?);
     }
     Ok(found)
 }
@@ -110,7 +110,7 @@ fn among_telling_pairs<'r>(
         return Ok(Vec::new());
     }
     let firsts: Vec<usize> = telling.iter().map(|pair| pair.first).collect();
-    let pictures = PicturePairs::load(survey, &firsts)?;
+    let mut pictures = PicturePairs::load(survey, &firsts)?;
     let compared =
         |k: usize, of_given: &[Option<Registered>]| compared(&telling, k, of_given, least_nats);
     // Pairs that are still to be registered may not fit as given.
@@ -118,14 +118,14 @@ fn among_telling_pairs<'r>(
         let mut all = (0..shifted.len()).filter_map(|k| compared(k, some));
         all.any(|comparison| comparison.may_take(&[]))
     };
-    let of_given = pictures.register(given, &firsts, may_take_any)?;
+    let of_given = pictures.register(given, may_take_any)?;
     if !may_take_any(&of_given) {
         return Ok(Vec::new());
     }
     let mut found = Vec::new();
     for (k, reading) in shifted.iter().enumerate() {
         if let Some(comparison) = compared(k, &of_given) {
-            found.extend(compare(&pictures, &firsts, &comparison, reading)?);
+            found.extend(compare(&mut pictures, &comparison, reading)?);
         }
     }
     Ok(found)
@@ -154,24 +154,23 @@ fn compared(
     })
 }
 
-/// Compares a reading with the one given by the frames after `firsts`; None if it is not taken.
+/// Compares a reading with the one given; None if it is not taken.
 fn compare<'r>(
-    pictures: &PicturePairs,
-    firsts: &[usize],
+    pictures: &mut PicturePairs,
     comparison: &Comparison,
     reading: &'r PoseReading,
 ) -> Result<Option<Found<'r>>, RefineError> {
     if !comparison.may_take(&[]) {
         return Ok(None);
     }
-    let registered = pictures.register(reading, firsts, |some| comparison.may_take(some))?;
+    let registered = pictures.register(reading, |some| comparison.may_take(some))?;
     let log_odds = comparison.log_odds(&registered, reading.changes_lens());
     let is_taken = comparison.may_take(&registered) && log_odds > comparison.least_nats;
     Ok(is_taken.then(|| Found {
         reading,
         fitting: registered.iter().flatten().count(),
         given: comparison.of_given.iter().flatten().count(),
-        pairs: firsts.len(),
+        pairs: comparison.of_given.len(),
         log_odds,
     }))
 }

@@ -98,8 +98,14 @@ pub fn run<'a>(
     Ok(estimation)
 }
 
-/// The result where equations have no solution: the initial poses.
-pub fn without_solution(setup: &Setup, session: &mut Session) -> Refined {
+/// The result where frames have no solution, for this reason if they are not rejected for others:
+/// the initial poses.
+pub fn without_solution(
+    setup: &Setup,
+    session: &mut Session,
+    reason: &RejectionReason,
+    mut rejections: Vec<Option<RejectionReason>>,
+) -> Refined {
     let count = setup.count();
     let unknown = Covariances::unknown(count);
     let estimates: Vec<FrameEstimate> = setup
@@ -109,12 +115,14 @@ pub fn without_solution(setup: &Setup, session: &mut Session) -> Refined {
         .map(|pose| FrameEstimate::at(*pose))
         .collect();
     let datum = setup.calibration.datum(&Kappa::zeros());
-    let rejections = vec![Some(RejectionReason::Unsolved); count];
+    for rejection in &mut rejections {
+        rejection.get_or_insert_with(|| reason.clone());
+    }
     let placement = Placement::new(setup, &datum, (&estimates, None), &unknown, rejections);
     let frames = (0..count).map(|k| placement.report_frame(setup, k, FrameSigma::unknown()));
     let parts = ReportParts {
         frames: frames.collect(),
-        stopped_because: RejectionReason::Unsolved.to_string(),
+        stopped_because: reason.to_string(),
         levels: Vec::new(),
         rolling_shutter: None,
         model_error: None,
