@@ -51,6 +51,10 @@ fn frames(found: &Discovery) -> Vec<String> {
     if let Some(group) = found.picture_frames() {
         lines.push(row("frames", pictures(group, &reading(found))));
     }
+    for camera in found.rig.iter().flat_map(|rig| &rig.cameras) {
+        let text = format!("{} (camera {} of a rig)", camera.pattern, camera.name);
+        lines.push(row("camera", text));
+    }
     let chosen = found.video.as_ref().map(|video| &video.path);
     let why = match chosen {
         Some(_) => "another video is taken",
@@ -69,12 +73,16 @@ fn frames(found: &Discovery) -> Vec<String> {
         let text = format!("{}: its images are not taken", printed(&parts.path));
         lines.push(row("other recording", text));
     }
-    let (taken, why) = match chosen {
-        Some(_) => (0, "a video is taken"),
-        None => (1, "not more than the frames"),
-    };
-    for group in found.pictures.iter().skip(taken) {
-        let why = group.fault.as_deref().unwrap_or(why);
+    for group in found.other_pictures() {
+        let why = match (&group.fault, found.picture_frames()) {
+            (Some(fault), _) => fault.clone(),
+            (None, None) => "the frames are in another file".to_owned(),
+            (None, Some(_)) => format!(
+                "a survey takes one group of pictures, the largest; images = {:?} under [frames] \
+                 takes this",
+                group.pattern
+            ),
+        };
         let text = format!("{}: {why}", pictures(group, ""));
         lines.push(row("other pictures", text));
     }

@@ -8,11 +8,15 @@ use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::read_tunnel_frame;
 
 /// Extensions of pictures in formats that are not read.
-const UNREAD_EXTENSIONS: [&str; 12] = [
-    "bmp", "dib", "gif", "pgm", "ppm", "pnm", "jp2", "heic", "heif", "hif", "avif", "dng",
+const UNREAD_EXTENSIONS: [&str; 16] = [
+    "bmp", "dib", "gif", "pgm", "ppm", "pnm", "pam", "pfm", "jp2", "jxl", "exr", "heic", "heif",
+    "hif", "avif", "dng",
 ];
 /// Extensions of files of measured points.
 const POINT_EXTENSIONS: [&str; 3] = ["ply", "las", "laz"];
+
+/// Files of binary COLMAP models beside the cameras and the poses.
+const MODEL_FILES: [&str; 3] = ["points3D.bin", "frames.bin", "rigs.bin"];
 
 /// The beginnings of remedies and lists of what is known, which are left out of reasons.
 const REMEDIES: [&str; 3] = [";", ", expected", ": neither of"];
@@ -81,6 +85,9 @@ pub(super) fn reason_by_name(folder: &Path, file: &Path, extension: &str) -> Str
         return format!("measured points: points = \"{name}\" under [tunnel] takes them");
     }
     match extension {
+        "bin" if MODEL_FILES.iter().any(|name| file.ends_with(name)) => {
+            "a part of COLMAP's model that is not needed".to_owned()
+        }
         "gcsv" => "a log of a gyro: tunnelstitch gyro makes poses of it".to_owned(),
         "db3" => "a recording of ROS 2 in SQLite: ros2 bag convert makes MCAP of it".to_owned(),
         _ => "by its name no file of a survey".to_owned(),

@@ -25,9 +25,10 @@ const UNITS: [(&str, f64); 3] = [
 /// Focal lengths over the given one that are tried: nearer ones are found by estimating them.
 const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
 
-/// Radii of a round tunnel over the given one that are tried: a diameter is given for the radius,
-/// or half a radius.
-const RADIUS_FACTORS: [(f64, &str); 2] = [(0.5, "twice"), (2.0, "half")];
+/// Radii of a round tunnel over the given one that are tried, a diameter given for the radius and
+/// half a radius among them: tenths of a decade. Neighbours of the right one are tried with it, since
+/// the frames agree with them better than with one that is farther off.
+const RADIUS_FACTORS: [f64; 8] = [0.4, 0.5, 0.63, 0.79, 1.26, 1.58, 2.0, 2.5];
 
 /// Places that poses may be off by, later or earlier.
 const SHIFTS: [isize; 6] = [1, -1, 2, -2, 3, -3];
@@ -169,16 +170,13 @@ impl Survey {
         let has_scale = self.file.poses.unit_m.is_some() || !format.has_no_scale();
         let radius_m = tunnel.radius_m.filter(|_| is_straight && has_scale);
         let factors = RADIUS_FACTORS.into_iter();
-        factors.filter_map(move |(factor, given)| {
+        factors.filter_map(move |factor| {
             let radius_m = factor * radius_m?;
             let scaled = |stamped: &StampedPose| StampedPose {
                 pose: Pose::new(stamped.pose.r_wc, stamped.pose.t_wc / factor),
                 ..*stamped
             };
-            let remedy = format!(
-                "a tunnel of which {given} the radius is given (radius_m = {radius_m} under \
-                 [tunnel])"
-            );
+            let remedy = radius_remedy(factor, radius_m);
             let initial = self.initial.iter().map(scaled).collect();
             let reading = PoseReading::of_poses(remedy, 1, initial);
             is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)
@@ -211,6 +209,23 @@ fn shift_remedy(shift_frames: isize) -> String {
     let frames = if count == 1 { "frame" } else { "frames" };
     let direction = if shift_frames > 0 { "later" } else { "earlier" };
     format!("the poses {count} {frames} {direction} (shift_frames = {shift_frames} under [poses])")
+}
+
+/// Another radius, `factor` times the given one, and the line that gives it.
+fn radius_remedy(factor: f64, radius_m: f64) -> String {
+    let line = format!("(radius_m = {} under [tunnel])", rounded(radius_m));
+    if factor == 0.5 {
+        format!("a tunnel of which twice the radius is given {line}")
+    } else if factor == 2.0 {
+        format!("a tunnel of which half the radius is given {line}")
+    } else {
+        format!("a tunnel of about {factor} times the given radius {line}")
+    }
+}
+
+/// A length rounded to a tenth of a millimetre, without the digits of binary fractions.
+fn rounded(length_m: f64) -> f64 {
+    (length_m * 1e4).round() / 1e4
 }
 
 /// Readings of the file's text other than that of a section: the order of its quaternions and of

@@ -46,6 +46,7 @@ fn parse_line(line: &str) -> Result<PoseEntry, String> {
     }
     let [x, y, z, qw, qx, qy, qz] = values;
     Ok(PoseEntry {
+        camera: None,
         name: None,
         time_s: Some(time_s),
         pose: Pose::new(
