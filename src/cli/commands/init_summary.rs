@@ -120,12 +120,14 @@ fn calibrations(found: &Discovery) -> Vec<String> {
         let text = "none: a pinhole is guessed, and refine searches for its focal length";
         return vec![row("calibration", text)];
     }
+    let has_rig = found.rig.is_some();
     let size = |k: usize| found.calibrations.get(k).map(FoundCalibration::size);
     let line = |(k, found): (usize, &FoundCalibration)| {
         let (width, height) = found.size();
-        let selected = found.selected.as_ref().map_or(String::new(), |selected| {
+        let selected = found.selected.as_ref().filter(|_| !has_rig);
+        let selected = selected.map_or(String::new(), |selected| {
             let SelectedCamera { name, of } = selected;
-            format!("; camera {name} of {of} that differ: name under [camera] selects another")
+            format!("; camera {name}, one of {of} that differ: name under [camera] selects another")
         });
         let text = format!("{} ({width} × {height} px{selected})", printed(&found.path));
         match k {

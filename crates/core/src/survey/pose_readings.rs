@@ -25,10 +25,12 @@ const UNITS: [(&str, f64); 3] = [
 /// Focal lengths over the given one that are tried: nearer ones are found by estimating them.
 const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
 
-/// Radii of a round tunnel over the given one that are tried, a diameter given for the radius and
-/// half a radius among them: tenths of a decade. Neighbours of the right one are tried with it, since
-/// the frames agree with them better than with one that is farther off.
-const RADIUS_FACTORS: [f64; 8] = [0.4, 0.5, 0.63, 0.79, 1.26, 1.58, 2.0, 2.5];
+/// Radii of a round tunnel over the given one that are tried: a diameter is given for the radius, or
+/// half a radius, and tenths of a decade on both sides of these, since frames agree with a radius
+/// near the right one, too. Nearer ones than that are for `refine` to find.
+const RADIUS_FACTORS: [f64; 6] = [0.4, 0.5, 0.63, 1.58, 2.0, 2.5];
+/// Prior of a radius that is off by another factor than two, nats: one in twenty.
+const OTHER_RADIUS_NATS: f64 = -3.0;
 
 /// Places that poses may be off by, later or earlier.
 const SHIFTS: [isize; 6] = [1, -1, 2, -2, 3, -3];
@@ -51,6 +53,8 @@ pub struct PoseReading {
     pub remedy: String,
     /// Number of its changes to the reading given.
     pub changes: usize,
+    /// Natural logarithm of its prior odds to a slip that people make often.
+    pub prior_nats: f64,
     /// The initial poses.
     pub initial: Trajectory,
     /// The orientation of the pictures against the one given.
@@ -67,6 +71,7 @@ impl PoseReading {
         Self {
             remedy,
             changes,
+            prior_nats: 0.0,
             initial,
             orientation: PictureOrientation::Stored,
             focal_factor: 1.0,
@@ -178,7 +183,11 @@ impl Survey {
             };
             let remedy = radius_remedy(factor, radius_m);
             let initial = self.initial.iter().map(scaled).collect();
-            let reading = PoseReading::of_poses(remedy, 1, initial);
+            let is_diameter = [0.5, 2.0].contains(&factor);
+            let reading = PoseReading {
+                prior_nats: if is_diameter { 0.0 } else { OTHER_RADIUS_NATS },
+                ..PoseReading::of_poses(remedy, 1, initial)
+            };
             is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)
         })
     }

@@ -261,7 +261,7 @@ fn write_rig(rig: &FoundRig, text: &mut String) {
         // Writing into a string cannot fail.
         let _ = writeln!(
             text,
-            "[[camera]]\nfile = {}\nname = {}\nframes = {}\nbody_to_camera = {}",
+            "[[camera]]\nfile = {}\nname = {}\nframes = {}\nbody_to_camera = {}\n",
             quoted(&rig.calibrations),
             quoted(&camera.name),
             quoted(&camera.pattern),

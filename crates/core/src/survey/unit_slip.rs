@@ -37,6 +37,7 @@ impl UnitSlip {
         poses_in: impl Fn(TimeUnit) -> Option<PoseFile>,
         frames_in: impl Fn(TimeUnit) -> Option<Vec<f64>>,
     ) -> Option<Self> {
+        let is_read = given.frames.is_some();
         let units = || TimeUnit::ALL.into_iter();
         let given_and = |value, others: Vec<_>| std::iter::once((None, value)).chain(others);
         let poses: Vec<(Option<TimeUnit>, Option<PoseFile>)> = given_and(
@@ -54,7 +55,8 @@ impl UnitSlip {
                     poses: *pose_unit,
                     frames: frame_unit,
                 };
-                let is_same = slip.poses == slip.frames;
+                // Other units of both change nothing, unless only these can be read.
+                let is_same = is_read && slip.poses == slip.frames;
                 let Some(file) = file.as_ref().filter(|_| !is_same) else {
                     continue;
                 };
@@ -89,7 +91,8 @@ impl fmt::Display for UnitSlip {
         let lines: Vec<String> = poses.into_iter().chain(frames).collect();
         write!(
             f,
-            "its times and those of the frames are in different units; they fit each other with {}",
+            "its times and those of the frames do not fit each other in the units taken, but do with \
+             {}",
             lines.join(" and ")
         )
     }

@@ -165,7 +165,7 @@ fn compare<'r>(
         return Ok(None);
     }
     let registered = pictures.register(reading, firsts, |some| comparison.may_take(some))?;
-    let log_odds = comparison.log_odds(&registered, reading.changes_lens());
+    let log_odds = reading.prior_nats + comparison.log_odds(&registered, reading.changes_lens());
     let is_taken = comparison.may_take(&registered) && log_odds > comparison.least_nats;
     Ok(is_taken.then(|| Found {
         reading,
