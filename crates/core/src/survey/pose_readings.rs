@@ -25,9 +25,9 @@ const UNITS: [(&str, f64); 3] = [
 /// Focal lengths over the given one that are tried: nearer ones are found by estimating them.
 const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
 
-/// Radii of a round tunnel over the given one that are tried: a diameter is given for the radius, or
-/// half a radius, and tenths of a decade on both sides of these, since frames agree with a radius
-/// near the right one, too. Nearer ones than that are for `refine` to find.
+/// Radii of a round tunnel over the given one that are tried: a diameter is given for the radius,
+/// or half a radius, and tenths of a decade on both sides of these, since frames agree with a
+/// radius near the right one, too. Nearer ones than that are for `refine` to find.
 const RADIUS_FACTORS: [f64; 6] = [0.4, 0.5, 0.63, 1.58, 2.0, 2.5];
 /// Prior of a radius that is off by another factor than two, nats: one in twenty.
 const OTHER_RADIUS_NATS: f64 = -3.0;

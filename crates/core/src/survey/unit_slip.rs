@@ -91,8 +91,8 @@ impl fmt::Display for UnitSlip {
         let lines: Vec<String> = poses.into_iter().chain(frames).collect();
         write!(
             f,
-            "its times and those of the frames do not fit each other in the units taken, but do with \
-             {}",
+            "its times and those of the frames do not fit each other in the units taken, but do \
+             with {}",
             lines.join(" and ")
         )
     }

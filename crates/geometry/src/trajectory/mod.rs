@@ -52,6 +52,7 @@ pub mod kitti;
 mod meshroom;
 mod metashape;
 mod mount;
+mod nanoseconds;
 pub mod nerfstudio;
 mod openmvg;
 mod opensfm;

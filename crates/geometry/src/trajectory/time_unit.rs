@@ -1,6 +1,6 @@
 //! Units of times in files and names.
 
-use super::times::from_nanoseconds;
+use super::nanoseconds::from_nanoseconds;
 use serde::{Deserialize, Serialize};
 
 /// Unit of the times in a file or in names.

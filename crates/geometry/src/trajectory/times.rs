@@ -1,5 +1,6 @@
 //! Times in text: seconds, or nanoseconds as whole numbers, unless another unit is given.
 
+use super::nanoseconds::from_nanoseconds;
 use super::time_unit::TimeUnit;
 
 /// Smallest number of digits of a whole number that is read as nanoseconds: nanoseconds since 1970
@@ -11,20 +12,6 @@ const MILLISECOND_DIGITS: usize = 13;
 
 /// Smallest number with so many digits.
 const MIN_NANOSECONDS: f64 = 1e15;
-
-/// Converts a whole number of nanoseconds to seconds; it may have decimals that are zeros, and an
-/// exponent.
-///
-/// A double holds times since 1970 to a quarter of a microsecond.
-pub fn from_nanoseconds(word: &str) -> Result<f64, String> {
-    let nanoseconds = whole_number(word)
-        .ok_or_else(|| format!("`{word}` is not a whole number of nanoseconds"))?;
-    let (seconds, rest) = (
-        nanoseconds.div_euclid(1_000_000_000),
-        nanoseconds.rem_euclid(1_000_000_000),
-    );
-    Ok(seconds as f64 + rest as f64 * 1e-9)
-}
 
 /// Converts a number to seconds: it is in `unit`; without one, numbers of 16 digits and more before
 /// the decimal point are nanoseconds, everything else is seconds. `None` if it is not a finite
@@ -44,30 +31,6 @@ pub fn from_word(word: &str, unit: Option<TimeUnit>) -> Option<f64> {
     let is_countable = number <= i64::MAX as f64;
     let rounded = is_countable.then_some(number * 1e-9);
     from_nanoseconds(word).ok().or(rounded)
-}
-
-/// The whole number that a text such as `15`, `15.00` or `1.5e1` has exactly.
-fn whole_number(word: &str) -> Option<i64> {
-    let (mantissa, exponent) = match word.split_once(['e', 'E']) {
-        Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),
-        None => (word, 0),
-    };
-    let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
-    let has_digits = mantissa.bytes().any(|byte| byte.is_ascii_digit());
-    if !(has_digits && decimals.bytes().all(|byte| byte.is_ascii_digit())) {
-        return None;
-    }
-    let decimals = decimals.trim_end_matches('0');
-    let zeros = usize::try_from(exponent)
-        .ok()?
-        .checked_sub(decimals.len())?;
-    // More digits than an i64 has.
-    if zeros > 19 {
-        return None;
-    }
-    format!("{whole}{decimals}{}", "0".repeat(zeros))
-        .parse()
-        .ok()
 }
 
 /// The time in a file's name (without its extension): its last number, in `unit`. Without one, that

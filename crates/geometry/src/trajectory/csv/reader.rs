@@ -6,11 +6,12 @@ use super::header::Header;
 use super::table::split;
 use crate::trajectory::entry_list::{EntryList, ParsedPoses};
 use crate::trajectory::error::PoseError;
+use crate::trajectory::nanoseconds::from_nanoseconds;
 use crate::trajectory::pose::Pose;
 use crate::trajectory::pose_entry::PoseEntry;
 use crate::trajectory::pose_options::PoseFileOptions;
+use crate::trajectory::text;
 use crate::trajectory::time_unit::TimeUnit;
-use crate::trajectory::{text, times};
 use csv::StringRecord;
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -108,9 +109,9 @@ impl RowReader {
             TimeColumn::One(column, unit) => {
                 text::time(&word(column), unit.or(self.time_unit), FORM)?
             }
-            TimeColumn::Nanoseconds(column) => times::from_nanoseconds(&word(column))?,
+            TimeColumn::Nanoseconds(column) => from_nanoseconds(&word(column))?,
             TimeColumn::Parts(seconds, nanoseconds) => {
-                text::number(&word(seconds), FORM)? + times::from_nanoseconds(&word(nanoseconds))?
+                text::number(&word(seconds), FORM)? + from_nanoseconds(&word(nanoseconds))?
             }
         }))
     }

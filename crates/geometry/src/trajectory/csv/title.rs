@@ -93,8 +93,8 @@ impl Title {
         self.name.split('_').any(|word| ANGLES.contains(&word))
     }
 
-    /// The rank of a time in a unit that brackets or the last word of the name tell; `stamp_secs` is
-    /// a part of one.
+    /// The rank of a time in a unit that brackets or the last word of the name tell; `stamp_secs`
+    /// is a part of one.
     fn rank_of_time(&self, unit: TimeUnit) -> Option<usize> {
         let name = match (self.unit.as_str(), self.name.rsplit_once('_')) {
             ("", Some((name, last))) if unit.name() == last => name,
