@@ -144,7 +144,7 @@ pub mod inspect;
 pub mod jobs;
 pub mod report;
 
-pub use tunnelstitch_core::{frames, persist, progress, raster, survey};
+pub use tunnelstitch_core::{frames, persist, points, progress, raster, survey};
 pub use tunnelstitch_evaluate as evaluate;
 pub use tunnelstitch_geometry::{camera, files, surface, trajectory};
 pub use tunnelstitch_refine as refine;

@@ -132,6 +132,28 @@ camera_matrix: {rows: 3, cols: 3, data: [415, 0, 318, 0, 417, 241, 0, 0, 1]}
 distortion_model: plumb_bob
 distortion_coefficients: {rows: 1, cols: 5, data: [-0.3, 0.1, 0.001, -0.002, 0]}
 END
+seed calibration camodocal 2 <<'END'
+%YAML:1.0
+---
+model_type: MEI
+camera_name: camera
+image_width: 640
+image_height: 480
+mirror_parameters:
+   xi: 1.5
+distortion_parameters:
+   k1: -0.1
+   k2: 0.01
+   p1: 0.001
+   p2: 0.0
+projection_parameters:
+   gamma1: 815.
+   gamma2: 817.
+   u0: 318.
+   v0: 241.
+END
+seed calibration basalt 0 <<<'{"value0": {"intrinsics": [{"camera_type": "ds", "intrinsics": {"fx": 157, "fy": 157, "cx": 255, "cy": 256, "xi": -0.18, "alpha": 0.59}}], "resolution": [[512, 512]]}}'
+seed calibration ocamcalib 3 <<<$'#polynomial coefficients\n5 -200 0 0.002 -0.000003 0.00000002\n\n#polynomial coefficients for the inverse mapping function\n4 300 180 -10 15\n\n#center\n240 320\n\n#affine parameters\n1 0 0\n\n#image size\n480 640'
 seed calibration gyroflow 0 <<'END'
 {"calib_dimension": {"w": 640, "h": 480}, "frame_readout_time": 15.5, "distortion_model": null, "digital_lens": null,
  "input_horizontal_stretch": 1.0, "crop": null, "fisheye_params": {"camera_matrix": [[415, 0, 318], [0, 417, 241], [0, 0, 1]],
@@ -210,6 +232,30 @@ done
 seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
 seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
 seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'
+printf '1 2 CAMERA 1 CAMERA 2 1 0.6 0 0.8 0 0.5 -1 2.25\n' | seed frames_of_reference rigs
+{
+    printf '\1\0\0\0\0\0\0\0\1\0\0\0\2\0\0\0\0\0\0\0\1\0\0\0\0\0\0\0\2\0\0\0\1'
+    printf '\0\0\0\0\0\0\360\77'
+    head -c 48 /dev/zero
+} | seed frames_of_reference rigs-binary
+seed points ply 0 <<<$'ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n4 5 6'
+seed points pcd 1 <<<$'VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n1 2 3\n4 5 6'
+seed points xyz 2 <<<$'x y z\n1 2 3\n4 5 6'
+# LAS 1.2 with a point of format 0: header of 227 bytes, little-endian.
+{
+    printf 'LASF'
+    head -c 20 /dev/zero
+    printf '\1\2'
+    head -c 64 /dev/zero
+    printf '\1\0\1\0\343\0\343\0\0\0\0\0\0\0\0\24\0\1\0\0\0\1\0\0\0'
+    head -c 16 /dev/zero
+    for _ in x y z; do printf '\0\0\0\0\0\0\360\77'; done
+    head -c 72 /dev/zero
+    printf '\1\0\0\0\2\0\0\0\3\0\0\0'
+    head -c 8 /dev/zero
+} >"$work/las"
+seed points las 3 <"$work/las"
+seed points laz 4 <"$work/las"
 seed frame_times times <<<$'0\n1\n2\n3'
 seed frame_times names <<<$'0.5 000000.png\n1 000001.png\n2 000002.png\n3000000000000000 000003.png'
 seed plan frames <<<$'frame,chainage_m,angle_deg,x_m,z_m\n0,0,350,0,0\n4,1,370,0.1,0'

@@ -175,7 +175,7 @@ fn a_camera_for_each_picture_is_shared_or_selected() {
     let second = second.replacen(focal, "431.5", 1);
     std::fs::write(&cameras, format!("{line}\n{second}\n")).unwrap();
     let said = succeed(&init);
-    assert!(said.contains("camera 1 of 2 that differ"), "{said}");
+    assert!(said.contains("camera 1, one of 2 that differ"), "{said}");
     let toml = std::fs::read_to_string(dir.join("survey.toml")).unwrap();
     assert!(toml.contains("\nname = \"1\""), "{toml}");
     succeed(&["check", text(dir)]);

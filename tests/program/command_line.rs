@@ -173,6 +173,13 @@ fn a_hyphen_is_standard_input_or_output() {
         .contains("--json")
     );
 
+    let plan = |out: &str| {
+        let motion = ["--advance-m", "0.1", "--turn-deg", "30", "--out", out];
+        succeed(&[&["plan", text(dir)], &motion[..]].concat())
+    };
+    plan(text(&file));
+    assert_eq!(plan("-"), std::fs::read_to_string(&file).unwrap());
+
     let pixels = "frame,u,v\n0,240,180\n1,100,90\n";
     let (input, output) = (dir.join("pixels.csv"), dir.join("points.csv"));
     std::fs::write(&input, pixels).unwrap();

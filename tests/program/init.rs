@@ -170,3 +170,28 @@ fn names_that_people_give_are_found_again() {
     );
     assert!(said.contains("photos [[]1[]]/*.jpg (4, "), "{said}");
 }
+
+/// Of pictures with different endings the largest group is taken, in any capitals, and the others
+/// are named.
+#[test]
+fn other_pictures_beside_the_frames_are_named() {
+    let survey = first_frames(5);
+    let dir = survey.path();
+    let frame = |name: &str| dir.join("frames").join(name);
+    std::fs::rename(frame("000001.jpg"), frame("000001.JPG")).unwrap();
+    let last = image::open(frame("000004.jpg")).unwrap();
+    last.save(frame("000004.png")).unwrap();
+    std::fs::remove_file(frame("000004.jpg")).unwrap();
+    let said = init(dir, &["--radius-m", "3", "--force"]);
+    for part in [
+        "frames          frames/*.[jJ][pP][gG] (4, ",
+        "other pictures  frames/*.png (1, ",
+        "images = \"frames/*.png\" under [frames] takes this",
+        "warning: frames/*.png (1) are left aside, beside the frames",
+    ] {
+        assert!(said.contains(part), "no {part} in {said}");
+    }
+    let output = tunnelstitch(&["init", text(dir), "--force", "--json"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["other_pictures"], json!(["frames/*.png"]));
+}

@@ -187,7 +187,7 @@ fn read_by_all(path: &Path, name: &str) {
             assert!((entry.pose.r_wc.norm() - 1.0).abs() < 1e-9, "{entry:?}");
         }
     }
-    for pose in [read_camera_in_body(path), read_tunnel_frame(path)]
+    for pose in [read_camera_in_body(path, None), read_tunnel_frame(path)]
         .into_iter()
         .flatten()
     {

@@ -311,6 +311,21 @@ fn a_list_of_times_ties_poses_to_numbered_frames() {
         message.contains("8 poses for 4 frames") && message.contains("--associate time"),
         "{message}"
     );
+
+    // In milliseconds, which the error names with the key.
+    std::fs::write(&times, "50000\n51000\n52000\n53000\n").unwrap();
+    let message = fail(&[&arguments[..], &by_time].concat(), 3);
+    let line = "time_unit = \"ms\"";
+    assert!(
+        message.contains(&format!("milliseconds ({line} under [frames]")),
+        "{message}"
+    );
+    edit(
+        &dir.join("survey.toml"),
+        "[frames]",
+        &format!("[frames]\n{line}"),
+    );
+    assert_same(&read_by_the_program(dir, &poses, &by_time), &truth, 1e-12);
 }
 
 /// Poses as ORB-SLAM3, spreadsheets, ROS and others write them are those of TUM.

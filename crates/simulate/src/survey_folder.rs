@@ -199,17 +199,8 @@ fn write_text_files(
         rig: options.rig.map(|_| RigSection::default()),
         frames: FramesSection {
             images: options.rig.is_none().then(|| pattern_of("frames", options)),
-            video: None,
-            bag: None,
-            topic: None,
-            every: None,
-            angle_step_deg: None,
-            times: None,
             mask: scene.shaft().map(|_| MASK_FILE.into()),
-            bits: None,
-            orientation: None,
-            skip_bad: None,
-            overlay: None,
+            ..FramesSection::default()
         },
         poses: PosesSection {
             truth: Some("groundtruth.tum".into()),

@@ -5,7 +5,7 @@ use crate::cli::arguments::{
 };
 use crate::cli::output::{
     Failure, PosesReport, RunRecord, Suggestion, SuggestionArguments, Terminal,
-    check_parent_folder, record,
+    check_parent_folder, is_stream, json, record, refuse_two_results,
 };
 use crate::files::printed;
 use crate::persist::atomic::OutputSet;
@@ -48,7 +48,7 @@ pub struct GyroArguments {
     /// exist yet.
     #[arg(long, value_name = "SURVEY")]
     survey: Option<PathBuf>,
-    /// The file of poses to write.
+    /// The file of poses to write; `-` prints them on standard output, without a record of the run.
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
@@ -189,7 +189,7 @@ impl SensorArguments {
         terminal: &Terminal,
     ) -> Result<Matrix3<f64>, Failure> {
         if let Some(path) = &self.body_to_camera {
-            let camera_in_body = read_camera_in_body(path)?;
+            let camera_in_body = read_camera_in_body(path, None)?;
             return Ok(camera_in_body
                 .r_wc
                 .inverse()
@@ -248,6 +248,12 @@ pub fn run(
              --advance-m, --advance-m-per-s or --table",
         );
     }
+    let (suggestion, readout_ms) = suggestion(arguments, &log, &baseline, terminal);
+    if is_stream(&arguments.out) {
+        refuse_two_results(&arguments.out, terminal)?;
+        suggestion.write(&arguments.suggestion)?;
+        return json::print_text(&tum::format(&baseline.trajectory));
+    }
     check_parent_folder(&arguments.out)?;
     let mut outputs = OutputSet::default();
     outputs.write_text(&arguments.out, &tum::format(&baseline.trajectory))?;
@@ -259,16 +265,28 @@ pub fn run(
     record.add_to(&mut outputs, &record::path_beside(&arguments.out), &inputs)?;
     outputs.commit()?;
     print_summary(arguments, &log, &baseline, terminal);
-    suggest_prior(arguments, &log, &baseline, terminal)
+    suggestion.show(&arguments.suggestion, terminal)?;
+    terminal.result(&GyroReport {
+        poses: suggestion.report(&arguments.out, baseline.trajectory.len()),
+        samples: log.samples.len(),
+        rest_span_s: baseline.rest.as_ref().map(|rest| rest.span_s),
+        bias_deg_per_s: baseline.bias_rad_s.map(f64::to_degrees).into(),
+        time_offset_s: baseline.offset_s,
+        clock_correlation: baseline.clock.map(|clock| clock.correlation),
+        turned_deg: baseline.turned_rad.to_degrees(),
+        step_sigma_deg: baseline.step_sigma_rad.to_degrees(),
+        readout_ms,
+    })
 }
 
-/// Prints the prior and the rolling shutter for `survey.toml`.
-fn suggest_prior(
+/// The prior and the rolling shutter for `survey.toml`; the readout time, milliseconds, if the log
+/// states one along the rows.
+fn suggestion(
     arguments: &GyroArguments,
     log: &GyroLog,
     baseline: &GyroBaseline,
     terminal: &Terminal,
-) -> Result<(), Failure> {
+) -> (Suggestion, Option<f64>) {
     let prior = PriorSection {
         model: JitterModel::RandomWalk,
         rotation_sigma_deg: baseline.step_sigma_rad.to_degrees(),
@@ -295,18 +313,7 @@ fn suggest_prior(
             .warn("the log states a rolling shutter that is read sideways, which is not supported"),
         None => {}
     }
-    suggestion.show(&arguments.suggestion, terminal)?;
-    terminal.result(&GyroReport {
-        poses: suggestion.report(&arguments.out, baseline.trajectory.len()),
-        samples: log.samples.len(),
-        rest_span_s: baseline.rest.as_ref().map(|rest| rest.span_s),
-        bias_deg_per_s: baseline.bias_rad_s.map(f64::to_degrees).into(),
-        time_offset_s: baseline.offset_s,
-        clock_correlation: baseline.clock.map(|clock| clock.correlation),
-        turned_deg: baseline.turned_rad.to_degrees(),
-        step_sigma_deg: baseline.step_sigma_rad.to_degrees(),
-        readout_ms: readout_ms.flatten(),
-    })
+    (suggestion, readout_ms.flatten())
 }
 
 /// The result, for `--json`.

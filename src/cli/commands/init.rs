@@ -65,7 +65,7 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
     }
     atomic::write_text(&path, &found.survey_toml(arguments.radius_m))?;
     terminal.say(format!("wrote {}", printed(&path)));
-    if let Some(sentence) = unknown_scale(&found) {
+    for sentence in pictures_beside(&found).chain(unknown_scale(&found)) {
         terminal.warn(sentence);
     }
     let fault = found.picture_frames().and_then(|group| group.fault.clone());
@@ -83,6 +83,10 @@ fn report<'a>(path: &'a Path, found: &'a Discovery, missing: Option<String>) -> 
     InitReport {
         survey_file: path,
         images: found.picture_frames().map(|group| group.pattern.as_str()),
+        other_pictures: found
+            .other_pictures()
+            .map(|group| group.pattern.as_str())
+            .collect(),
         video: found.video.as_ref().map(|video| video.path.as_path()),
         recording: found.recorded.as_ref().map(|(path, _)| path.as_path()),
         mask: found.mask.as_deref(),
@@ -113,6 +117,22 @@ fn write_axis(folder: &Path, axis: &TunnelAxis, force: bool) -> Result<(), Failu
     refuse_existing(&path, force)?;
     let json = serde_json::to_string(axis).map_err(|error| Failure::bug(error.to_string()))?;
     Ok(atomic::write_text(&path, &(json + "\n"))?)
+}
+
+/// The sentences about pictures that may belong to the sequence of the frames.
+fn pictures_beside(found: &Discovery) -> impl Iterator<Item = String> {
+    let frames = found.picture_frames().into_iter();
+    let beside = frames.flat_map(|frames| {
+        let others = found.other_pictures();
+        others.filter_map(move |other| other.may_continue(frames).then_some((frames, other)))
+    });
+    beside.map(|(frames, other)| {
+        format!(
+            "{} ({}) are left aside, beside the frames {} ({}) and of their size: if they are \
+             frames, too, convert them to the same format",
+            other.pattern, other.count, frames.pattern, frames.count
+        )
+    })
 }
 
 /// The sentence about poses without a known scale, if they have none.
@@ -155,6 +175,8 @@ fn missing(found: &Discovery, error: &SurveyError) -> String {
 struct InitReport<'a> {
     survey_file: &'a Path,
     images: Option<&'a str>,
+    /// Patterns of the other pictures.
+    other_pictures: Vec<&'a str>,
     video: Option<&'a Path>,
     recording: Option<&'a Path>,
     mask: Option<&'a Path>,

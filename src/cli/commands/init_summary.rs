@@ -51,6 +51,10 @@ fn frames(found: &Discovery) -> Vec<String> {
     if let Some(group) = found.picture_frames() {
         lines.push(row("frames", pictures(group, &reading(found))));
     }
+    for camera in found.rig.iter().flat_map(|rig| &rig.cameras) {
+        let text = format!("{} (camera {} of a rig)", camera.pattern, camera.name);
+        lines.push(row("camera", text));
+    }
     let chosen = found.video.as_ref().map(|video| &video.path);
     let why = match chosen {
         Some(_) => "another video is taken",
@@ -69,12 +73,16 @@ fn frames(found: &Discovery) -> Vec<String> {
         let text = format!("{}: its images are not taken", printed(&parts.path));
         lines.push(row("other recording", text));
     }
-    let (taken, why) = match chosen {
-        Some(_) => (0, "a video is taken"),
-        None => (1, "not more than the frames"),
-    };
-    for group in found.pictures.iter().skip(taken) {
-        let why = group.fault.as_deref().unwrap_or(why);
+    for group in found.other_pictures() {
+        let why = match (&group.fault, found.picture_frames()) {
+            (Some(fault), _) => fault.clone(),
+            (None, None) => "the frames are in another file".to_owned(),
+            (None, Some(_)) => format!(
+                "a survey takes one group of pictures, the largest; images = {:?} under [frames] \
+                 takes this",
+                group.pattern
+            ),
+        };
         let text = format!("{}: {why}", pictures(group, ""));
         lines.push(row("other pictures", text));
     }
@@ -112,12 +120,14 @@ fn calibrations(found: &Discovery) -> Vec<String> {
         let text = "none: a pinhole is guessed, and refine searches for its focal length";
         return vec![row("calibration", text)];
     }
+    let has_rig = found.rig.is_some();
     let size = |k: usize| found.calibrations.get(k).map(FoundCalibration::size);
     let line = |(k, found): (usize, &FoundCalibration)| {
         let (width, height) = found.size();
-        let selected = found.selected.as_ref().map_or(String::new(), |selected| {
+        let selected = found.selected.as_ref().filter(|_| !has_rig);
+        let selected = selected.map_or(String::new(), |selected| {
             let SelectedCamera { name, of } = selected;
-            format!("; camera {name} of {of} that differ: name under [camera] selects another")
+            format!("; camera {name}, one of {of} that differ: name under [camera] selects another")
         });
         let text = format!("{} ({width} × {height} px{selected})", printed(&found.path));
         match k {

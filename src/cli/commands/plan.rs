@@ -4,7 +4,8 @@ use crate::cli::arguments::{
     FrameTimesArguments, MotionArguments, MountingArguments, clock_times, numbers, positive,
 };
 use crate::cli::output::{
-    Failure, RunRecord, Suggestion, SuggestionArguments, Terminal, check_parent_folder, record,
+    Failure, RunRecord, Suggestion, SuggestionArguments, Terminal, check_parent_folder, is_stream,
+    json, record, refuse_two_results,
 };
 use crate::files::printed;
 use crate::persist::atomic::OutputSet;
@@ -32,7 +33,7 @@ pub struct PlanArguments {
     /// Folder of the survey whose frames get the poses, or its survey.toml. Its own poses need not
     /// exist yet.
     survey: Option<PathBuf>,
-    /// The file of poses to write.
+    /// The file of poses to write; `-` prints them on standard output, without a record of the run.
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
@@ -111,6 +112,22 @@ pub fn run(
             pose: station.carrier().after(&camera),
         })
         .collect();
+    let prior = PriorSection {
+        rotation_sigma_deg: arguments.rotation_sigma_deg,
+        translation_sigma_m: arguments.translation_sigma_m,
+        ..PriorSection::default()
+    };
+    let mut suggestion = Suggestion::new(&arguments.out, arguments.survey.as_deref(), prior);
+    suggestion
+        .add_remark("The prior says how well the carrier follows the plan from frame to frame:");
+    suggestion.add_remark(
+        "adapt it to your carrier, or give --rotation-sigma-deg and --translation-sigma-m.",
+    );
+    if is_stream(&arguments.out) {
+        refuse_two_results(&arguments.out, terminal)?;
+        suggestion.write(&arguments.suggestion)?;
+        return json::print_text(&tum::format(&trajectory));
+    }
     check_parent_folder(&arguments.out)?;
     let mut outputs = OutputSet::default();
     outputs.write_text(&arguments.out, &tum::format(&trajectory))?;
@@ -130,17 +147,6 @@ pub fn run(
             last.angle_rad.to_degrees()
         ));
     }
-    let prior = PriorSection {
-        rotation_sigma_deg: arguments.rotation_sigma_deg,
-        translation_sigma_m: arguments.translation_sigma_m,
-        ..PriorSection::default()
-    };
-    let mut suggestion = Suggestion::new(&arguments.out, arguments.survey.as_deref(), prior);
-    suggestion
-        .add_remark("The prior says how well the carrier follows the plan from frame to frame:");
-    suggestion.add_remark(
-        "adapt it to your carrier, or give --rotation-sigma-deg and --translation-sigma-m.",
-    );
     suggestion.show(&arguments.suggestion, terminal)?;
     terminal.result(&suggestion.report(&arguments.out, trajectory.len()))
 }

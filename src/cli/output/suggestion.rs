@@ -80,21 +80,28 @@ impl Suggestion {
         arguments: &SuggestionArguments,
         terminal: &Terminal,
     ) -> Result<(), Failure> {
-        let sections = toml::to_string(self)
-            .map_err(|error| Failure::bug(format!("cannot write the sections: {error}")))?;
-        let remarks: String = self
-            .remarks
-            .iter()
-            .map(|text| format!("# {text}\n"))
-            .collect();
-        let text = remarks + &sections;
         terminal.say("for survey.toml:\n");
-        for line in text.lines() {
+        for line in self.text()?.lines() {
             terminal.say(format!("    {line}").trim_end());
         }
+        self.write(arguments)
+    }
+
+    /// Writes the lines to the file of --toml-out.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, arguments: &SuggestionArguments) -> Result<(), Failure> {
         if let Some(path) = &arguments.toml_out {
-            atomic::write_text(path, &text)?;
+            atomic::write_text(path, &self.text()?)?;
         }
         Ok(())
+    }
+
+    fn text(&self) -> Result<String, Failure> {
+        let sections = toml::to_string(self)
+            .map_err(|error| Failure::bug(format!("cannot write the sections: {error}")))?;
+        let remarks = self.remarks.iter().map(|text| format!("# {text}\n"));
+        Ok(remarks.collect::<String>() + &sections)
     }
 }

@@ -35,10 +35,14 @@ pub enum UnreadFormat {
     Bmp,
     /// GIF.
     Gif,
-    /// Netpbm's PGM and PPM, which cameras of machine vision write.
+    /// Netpbm's PGM, PPM and PFM, which cameras of machine vision write.
     Netpbm,
     /// JPEG 2000.
     Jpeg2000,
+    /// JPEG XL.
+    JpegXl,
+    /// OpenEXR.
+    OpenExr,
     /// HEIF or AVIF, as phones write them.
     Heif,
     /// Adobe's Digital Negative.
@@ -62,10 +66,15 @@ impl UnreadFormat {
         match start.as_slice() {
             [b'B', b'M', ..] => Some(Self::Bmp),
             [b'G', b'I', b'F', b'8', ..] => Some(Self::Gif),
-            [b'P', b'2' | b'3' | b'5' | b'6', end, ..] if end.is_ascii_whitespace() => {
-                Some(Self::Netpbm)
-            }
+            [
+                b'P',
+                b'2' | b'3' | b'5' | b'6' | b'7' | b'f' | b'F',
+                end,
+                ..,
+            ] if end.is_ascii_whitespace() => Some(Self::Netpbm),
             [0, 0, 0, 12, b'j', b'P', b' ', b' ', ..] => Some(Self::Jpeg2000),
+            [0, 0, 0, 12, b'J', b'X', b'L', b' ', ..] | [0xff, 0x0a, ..] => Some(Self::JpegXl),
+            [0x76, 0x2f, 0x31, 0x01, ..] => Some(Self::OpenExr),
             [_, _, _, _, b'f', b't', b'y', b'p', rest @ ..] => {
                 let is_heif = HEIF_BRANDS.iter().any(|brand| rest.starts_with(brand));
                 is_heif.then_some(Self::Heif)
@@ -116,8 +125,10 @@ impl UnreadFormat {
         match self {
             Self::Bmp => "BMP",
             Self::Gif => "GIF",
-            Self::Netpbm => "PGM or PPM",
+            Self::Netpbm => "PGM, PPM or PFM",
             Self::Jpeg2000 => "JPEG 2000",
+            Self::JpegXl => "JPEG XL",
+            Self::OpenExr => "OpenEXR",
             Self::Heif => "HEIF or AVIF",
             Self::Dng => "DNG",
             Self::Raw => "a raw picture",
@@ -135,9 +146,14 @@ impl UnreadFormat {
                 (command, "ImageMagick", "png")
             }
             // Grey values between 0 and 1 become 0 to 65535.
-            Self::FloatTiff => {
+            Self::FloatTiff | Self::OpenExr => {
                 let command = format!("mogrify -depth 16 -format png {files}");
                 (command, "ImageMagick, for values from 0 to 1", "png")
+            }
+            Self::JpegXl => {
+                let each = "djxl \"$f\" \"${f%.*}.png\"";
+                let command = format!("for f in {files}; do {each}; done");
+                (command, "libjxl", "png")
             }
             Self::Heif => {
                 let each = "heif-convert \"$f\" \"${f%.*}.png\"";
@@ -212,7 +228,11 @@ mod tests {
             (&b"BM\x7a\xe9\x07\0"[..], UnreadFormat::Bmp),
             (b"GIF89a\x10\0", UnreadFormat::Gif),
             (b"P5\n4 4\n255\n", UnreadFormat::Netpbm),
+            (b"Pf\n4 4\n-1.0\n", UnreadFormat::Netpbm),
             (b"\0\0\0\x0cjP  \r\n\x87\n", UnreadFormat::Jpeg2000),
+            (b"\0\0\0\x0cJXL \r\n\x87\n", UnreadFormat::JpegXl),
+            (b"\xff\x0a\xfa\x7f", UnreadFormat::JpegXl),
+            (b"v/1\x01\x02\0\0\0", UnreadFormat::OpenExr),
             (b"\0\0\0\x1cftypheic\0\0\0\0", UnreadFormat::Heif),
             (b"\0\0\0\x1cftypavif\0\0\0\0", UnreadFormat::Heif),
         ] {

@@ -65,7 +65,7 @@ pub(super) fn by_order(
             frames: frames.len(),
             remedy: if file.has_names() {
                 "; or associate them by name (--associate name)"
-            } else if file.has_times() && (times_s.is_some() || from_names(frames).is_ok()) {
+            } else if file.has_times() && (times_s.is_some() || from_names(frames, None).is_ok()) {
                 "; or associate them by time (--associate time)"
             } else if file.has_times() {
                 "; or associate them by time (--associate time), with a list of the frames' times \
@@ -288,6 +288,7 @@ mod tests {
     fn file(names: &[&str]) -> PoseFile {
         let poses = spiral(names.len(), 0.1, 0.5);
         let entry = |(k, name): (usize, &&str)| PoseEntry {
+            camera: None,
             name: Some((*name).to_owned()),
             time_s: Some(10.0 + k as f64),
             pose: poses[k],

@@ -3,6 +3,7 @@
 use super::file::SURVEY_FILE;
 use super::found_calibration::FoundCalibration;
 use super::left_aside::{LeftAside, reason_by_name, reason_of_text};
+use super::model_cameras::{FoundRig, camera_of};
 use super::picture_group::PictureGroup;
 use super::recorded_parts::{FoundInRecording, RecordedFrames, RecordedParts};
 use super::straight_axis::{AXIS_FILE, FoundAxis};
@@ -58,6 +59,8 @@ pub struct Discovery {
     pub recorded: Option<(PathBuf, RecordedFrames)>,
     /// Groups of pictures, the largest first.
     pub pictures: Vec<PictureGroup>,
+    /// The rig of a COLMAP model that took several of these groups.
+    pub rig: Option<FoundRig>,
     /// Calibrations, those with the frames' size first, and among these those that state it.
     pub calibrations: Vec<FoundCalibration>,
     /// Pose files; first those with as many poses as frames, and among these first those not named
@@ -83,8 +86,8 @@ impl Discovery {
     /// A folder that cannot be read.
     pub fn of(folder: &Path) -> std::io::Result<Self> {
         let walked = WalkedFolder::of(folder)?;
-        let group = |((parent, extension), files): (&(PathBuf, String), &Vec<&PathBuf>)| {
-            PictureGroup::of(folder, parent, extension, files)
+        let group = |((parent, _), files): (&(PathBuf, String), &Vec<&PathBuf>)| {
+            PictureGroup::of(folder, parent, files)
         };
         let mut found = Self {
             pictures: picture_files(&walked.files).iter().map(group).collect(),
@@ -116,9 +119,31 @@ impl Discovery {
                 aside.push((file.clone(), reason));
             }
         }
-        found.left_aside = LeftAside::grouped(aside);
         found.sort();
+        found.find_cameras(folder);
+        let rigs = found.rig.as_ref().map(|rig| rig.path.clone());
+        aside.retain(|(path, _)| Some(path) != rigs.as_ref());
+        found.left_aside = LeftAside::grouped(aside);
         Ok(found)
+    }
+
+    /// Finds the cameras that took the pictures, if the poses are those of a COLMAP model.
+    fn find_cameras(&mut self, folder: &Path) {
+        let Some(initial) = self.initial() else {
+            return;
+        };
+        self.rig = FoundRig::of(folder, initial, &self.pictures);
+        let of_frames = self.pictures.first().and_then(|group| {
+            let (path, poses) = self.initial()?;
+            Some((path.parent()?.to_owned(), camera_of(poses, group)?))
+        });
+        if let Some((model, name)) = of_frames {
+            let of_model = |found: &&mut FoundCalibration| found.path.parent() == Some(&model);
+            let calibrations = self.calibrations.iter_mut();
+            calibrations
+                .filter(of_model)
+                .for_each(|found| found.select(folder, &name));
+        }
     }
 
     /// Takes the parts of a recording.
@@ -204,6 +229,7 @@ impl Discovery {
         every: usize,
     ) -> Result<(), FrameError> {
         let video = Video::open(&folder.join(path))?;
+        self.rig = None;
         // The rows of a turned picture are not read one after the other.
         let has_rows = video.rotation_deg() == 0;
         let readout_ms = gopro_readout_ms(video.path()).filter(|_| has_rows);
@@ -240,6 +266,15 @@ impl Discovery {
     pub fn picture_frames(&self) -> Option<&PictureGroup> {
         let has_pictures = self.video.is_none() && self.recorded.is_none();
         self.pictures.first().filter(|_| has_pictures)
+    }
+
+    /// The other pictures in files: those that are not the frames.
+    pub fn other_pictures(&self) -> impl Iterator<Item = &PictureGroup> {
+        let rig = self.rig.as_ref();
+        // The largest group is that of the frames.
+        let taken = usize::from(self.video.is_none() && self.recorded.is_none());
+        let others = self.pictures.iter().skip(taken);
+        others.filter(move |group| !rig.is_some_and(|rig| rig.has(group)))
     }
 
     /// Decodes frames of the searched `folder`, if the calibration fits them, to find out whether
@@ -335,8 +370,8 @@ fn extension(file: &Path) -> String {
 fn picture_files(files: &[PathBuf]) -> PictureFiles<'_> {
     let mut groups: PictureFiles = BTreeMap::new();
     for file in files {
-        let extension = extension(file);
-        if PICTURE_EXTENSIONS.contains(&extension.to_lowercase().as_str()) && !is_mask(file) {
+        let extension = extension(file).to_lowercase();
+        if PICTURE_EXTENSIONS.contains(&extension.as_str()) && !is_mask(file) {
             let parent = file.parent().unwrap_or(Path::new("")).to_owned();
             groups.entry((parent, extension)).or_default().push(file);
         }
@@ -364,7 +399,7 @@ fn is_truth(path: &Path) -> bool {
     words.iter().any(|word| name.contains(word)) || name == "gt" || name.starts_with("gt_")
 }
 
-/// The pictures of a folder with an extension.
+/// The pictures of a folder with an extension, in lower case.
 type PictureFiles<'a> = BTreeMap<(PathBuf, String), Vec<&'a PathBuf>>;
 
 /// Reads a file of `bytes` bytes, if it is not larger than allowed.

@@ -73,7 +73,7 @@ pub enum SurveyError {
     /// A frame's time is needed, but unknown.
     #[error(
         "frame {frame} ({}): its name contains no time (seconds with a decimal point, or \
-         nanoseconds); give a file of times by \
+         nanoseconds; time_unit under [frames] names another unit); give a file of times by \
          --frame-times FILE (frames.times in survey.toml)",
         printed(file)
     )]

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::files::limits::MAX_SURVEY_BYTES;
 use tunnelstitch_geometry::files::{line_and_column, read_text};
-use tunnelstitch_geometry::trajectory::{Jitter, JitterModel};
+use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, TimeUnit};
 
 /// Name of the file that describes a survey.
 pub const SURVEY_FILE: &str = "survey.toml";
@@ -113,6 +113,9 @@ pub struct FramesSection {
     /// A file of the frames' times, if they are not in the names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
+    /// The unit of the times in that file, or in the names; by default the number of digits tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_unit: Option<TimeUnit>,
     /// An image of the frames' size, black where they never show the wall; see
     /// [`crate::frames::Mask`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -243,6 +246,7 @@ mod tests {
                 every: Some(5),
                 angle_step_deg: Some(15.0),
                 times: Some("times.txt".into()),
+                time_unit: Some(TimeUnit::Ms),
                 mask: Some("mask.png".into()),
                 bits: None,
                 orientation: None,
@@ -253,6 +257,7 @@ mod tests {
                 format: Some(PoseFormat::Csv),
                 columns: [(PoseColumn::Tx, "px".to_owned())].into(),
                 quaternion: Some(QuaternionOrder::Wxyz),
+                time_unit: Some(TimeUnit::Us),
                 convention: Some(Direction::WorldToCamera),
                 camera_axes: Some(CameraAxes::OpenGl),
                 associate: Some(Associate::Time),

@@ -70,6 +70,21 @@ impl FoundCalibration {
         }
     }
 
+    /// Selects another of several cameras of the file, if it can be read.
+    pub(super) fn select(&mut self, folder: &Path, name: &str) {
+        let Some(selected) = self
+            .selected
+            .as_mut()
+            .filter(|selected| selected.name != name)
+        else {
+            return;
+        };
+        if let Ok(camera) = read_calibration_of(&folder.join(&self.path), Some(name), &|| None) {
+            name.clone_into(&mut selected.name);
+            self.camera = camera;
+        }
+    }
+
     /// Width and height, pixels.
     pub fn size(&self) -> (u32, u32) {
         (self.camera.width, self.camera.height)

@@ -4,9 +4,11 @@ use super::error::SurveyError;
 use super::file::FramesSection;
 use super::frame_times;
 use crate::frames::{self, FrameFile, PictureOrientation, PictureReading, RecordedImages, Video};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use tunnelstitch_geometry::files::printed;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// The frames that a `[frames]` section names.
 pub(super) struct FrameList {
@@ -134,7 +136,7 @@ impl FrameList {
         };
         let own = section.times.as_ref().map(|times| folder.join(times));
         if let Some(path) = frame_times.or(own.as_deref()) {
-            listing.times_s = Some(frame_times::read(path, &listing.frames)?);
+            listing.times_s = Some(frame_times::read(path, &listing.frames, section.time_unit)?);
         }
         Ok(listing)
     }
@@ -153,18 +155,16 @@ impl FrameList {
 
     /// The frames with pictures read as turned for display, if only these have the `size` of the
     /// calibration; also the warning that they are, or that they are not although their EXIF data
-    /// name an orientation. A section that says which is followed without a word.
+    /// name an orientation, or several. A section that says which is followed without a word.
     pub fn oriented(mut self, size: (u32, u32), section: &FramesSection) -> (Self, Option<String>) {
-        // A file that cannot be read is an error of its own.
-        let first = match section.orientation {
-            Some(_) => None,
-            None => self.frames.iter().find(|frame| frame.size().is_ok()),
-        };
-        let named = first.and_then(|first| Some((first, first.exif_orientation().ok()??)));
-        let Some((first, number)) = named else {
+        if section.orientation.is_some() {
+            return (self, None);
+        }
+        let named = NamedOrientations::of(&self.frames);
+        let Some(first) = named.first.map(|k| &self.frames[k]) else {
             return (self, None);
         };
-        let file = printed(first.file()).to_string();
+        let named = named.sentence(&printed(first.file()).to_string());
         let turned = PictureReading {
             orientation: PictureOrientation::Exif,
             ..picture_reading(section).unwrap_or_default()
@@ -175,7 +175,7 @@ impl FrameList {
             let frames = self.frames.into_iter();
             self.frames = frames.map(|frame| frame.with_reading(turned)).collect();
         }
-        (self, Some(orientation_warning(&file, number, is_turned)))
+        (self, Some(orientation_warning(&named, is_turned)))
     }
 
     fn of_images(listed: Vec<FrameFile>, reading: PictureReading) -> Self {
@@ -210,11 +210,59 @@ impl FrameList {
     }
 }
 
+/// The orientations that EXIF data of frames name.
+struct NamedOrientations {
+    /// Number of frames with each; 1 is as stored.
+    counts: BTreeMap<u8, usize>,
+    /// Place of the first frame with another than 1.
+    first: Option<usize>,
+}
+
+impl NamedOrientations {
+    /// Opens all files; of a recording, its first image. Files that cannot be read are errors of
+    /// their own.
+    fn of(frames: &[FrameFile]) -> Self {
+        let own_files = frames.iter().all(|frame| frame.shared_file().is_none());
+        let opened = if own_files {
+            frames
+        } else {
+            &frames[..frames.len().min(1)]
+        };
+        let numbers = opened.par_map(|frame| frame.exif_orientation().ok());
+        let mut counts = BTreeMap::new();
+        for number in numbers.iter().flatten() {
+            *counts.entry(number.unwrap_or(1)).or_default() += 1;
+        }
+        let is_other = |number: &Option<Option<u8>>| matches!(number, Some(Some(_)));
+        Self {
+            counts,
+            first: numbers.iter().position(is_other),
+        }
+    }
+
+    /// The orientations, in words; `file`: the first frame with one.
+    fn sentence(&self, file: &str) -> String {
+        let counts: Vec<String> = self
+            .counts
+            .iter()
+            .map(|(number, count)| format!("{number} of {count}"))
+            .collect();
+        match self.counts.iter().last() {
+            Some((number, _)) if self.counts.len() == 1 => format!(
+                "{file}: by its EXIF orientation ({number}) it is to be turned or mirrored for \
+                 display"
+            ),
+            _ => format!(
+                "the frames have different EXIF orientations ({} frames), by which some, as \
+                 {file}, are to be turned or mirrored for display",
+                counts.join(", ")
+            ),
+        }
+    }
+}
+
 /// The warning that pictures whose EXIF data name an orientation are turned, or that they are not.
-fn orientation_warning(file: &str, number: u8, is_turned: bool) -> String {
-    let named = format!(
-        "{file}: by its EXIF orientation ({number}) it is to be turned or mirrored for display"
-    );
+fn orientation_warning(named: &str, is_turned: bool) -> String {
     if is_turned {
         format!(
             "{named}, which is done, since the calibration fits only that; the poses must be \
@@ -227,5 +275,54 @@ fn orientation_warning(file: &str, number: u8, is_turned: bool) -> String {
              stored; if the camera was calibrated with turned pictures, add orientation = \
              \"exif\" under [frames], otherwise orientation = \"stored\""
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A JPEG file of 8 × 6 pixels with an EXIF orientation, 0 for none.
+    fn write_jpeg(path: &Path, orientation: u8) {
+        let mut bytes = Vec::new();
+        let picture = image::GrayImage::new(8, 6);
+        let encoder = image::codecs::jpeg::JpegEncoder::new(&mut bytes);
+        picture.write_with_encoder(encoder).unwrap();
+        let exif = [
+            &b"\xff\xe1\0\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0"[..],
+            &[orientation, 0, 0, 0, 0, 0, 0],
+        ];
+        if orientation > 0 {
+            bytes.splice(2..2, exif.concat());
+        }
+        std::fs::write(path, bytes).unwrap();
+    }
+
+    /// The warning of frames with these orientations, and whether they are turned.
+    fn warning(orientations: &[u8], size: (u32, u32)) -> (String, bool) {
+        let dir = tempfile::tempdir().unwrap();
+        for (k, orientation) in orientations.iter().enumerate() {
+            write_jpeg(&dir.path().join(format!("{k}.jpg")), *orientation);
+        }
+        let section = FramesSection {
+            images: Some("*.jpg".to_owned()),
+            ..FramesSection::default()
+        };
+        let toml = dir.path().join("survey.toml");
+        let listed = FrameList::new(&section, &toml, dir.path(), None).unwrap();
+        let (listed, warning) = listed.oriented(size, &section);
+        let turned = listed.frames[0].reading().unwrap().orientation == PictureOrientation::Exif;
+        (warning.unwrap_or_default(), turned)
+    }
+
+    #[test]
+    fn different_orientations_are_named() {
+        let (said, turned) = warning(&[0, 1, 6, 6, 3], (8, 6));
+        assert!(!turned && said.contains("which is not done"), "{said}");
+        assert!(said.contains("(1 of 2, 3 of 1, 6 of 2 frames)"), "{said}");
+        assert!(said.contains("as ") && said.contains("2.jpg"), "{said}");
+        let (said, turned) = warning(&[6, 6], (6, 8));
+        assert!(turned && said.contains("EXIF orientation (6)"), "{said}");
+        assert_eq!(warning(&[0, 1, 0], (8, 6)), (String::new(), false));
     }
 }

@@ -4,19 +4,24 @@ use super::error::SurveyError;
 use crate::frames::FrameFile;
 use std::collections::HashMap;
 use std::path::Path;
-use tunnelstitch_geometry::trajectory::{PoseError, text, times};
+use tunnelstitch_geometry::trajectory::{PoseError, TimeUnit, text, times};
 
 /// Reads the frames' times, seconds, one per frame.
 ///
 /// One line per frame: its time alone, in the order of the frames' names (KITTI's `times.txt`); or
 /// time and name in either order (TUM's `rgb.txt`, EuRoC's `data.csv`), with blanks or a comma
-/// between. Whole numbers of 16 digits and more are nanoseconds, all else is seconds. Lines of
-/// files that are not frames of the survey are ignored.
+/// between. They are in `unit`; without one, a comment tells it, as `[ns]`, or whole numbers of 16
+/// digits and more are nanoseconds, all else is seconds. Lines of files that are not frames of the
+/// survey are ignored.
 ///
 /// # Errors
 /// An unreadable file, a line of another form, a frame without a time, two times of one frame.
-pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, SurveyError> {
-    let lines = read_lines(path)?;
+pub(super) fn read(
+    path: &Path,
+    frames: &[FrameFile],
+    unit: Option<TimeUnit>,
+) -> Result<Vec<f64>, SurveyError> {
+    let lines = read_lines(path, unit)?;
     let file = |what: String| SurveyError::from(PoseError::file(path, what));
     if lines.iter().all(|line| line.name.is_none()) {
         return if lines.len() == frames.len() {
@@ -57,7 +62,7 @@ pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, Survey
 /// # Errors
 /// An unreadable file, a line of another form.
 pub fn read_frame_times(path: &Path) -> Result<Vec<f64>, SurveyError> {
-    let lines = read_lines(path)?;
+    let lines = read_lines(path, None)?;
     Ok(lines.into_iter().map(|line| line.time_s).collect())
 }
 
@@ -68,8 +73,9 @@ struct Line {
     name: Option<String>,
 }
 
-fn read_lines(path: &Path) -> Result<Vec<Line>, SurveyError> {
+fn read_lines(path: &Path, unit: Option<TimeUnit>) -> Result<Vec<Line>, SurveyError> {
     let text = text::read(path)?;
+    let unit = unit.or_else(|| TimeUnit::of_comments(&text));
     let mut lines = Vec::new();
     for (number, line) in text::lines(&text) {
         let fail = |what: String| PoseError::line(path, number, what);
@@ -79,7 +85,7 @@ fn read_lines(path: &Path) -> Result<Vec<Line>, SurveyError> {
             .collect();
         let (time, name) = match words.as_slice() {
             [time] => (*time, None),
-            [first, second] if times::from_word(first).is_some() => (*first, Some(*second)),
+            [first, second] if times::from_word(first, unit).is_some() => (*first, Some(*second)),
             [first, second] => (*second, Some(*first)),
             _ => {
                 return Err(fail(format!(
@@ -89,7 +95,7 @@ fn read_lines(path: &Path) -> Result<Vec<Line>, SurveyError> {
                 .into());
             }
         };
-        let time_s = times::from_word(time).ok_or_else(|| {
+        let time_s = times::from_word(time, unit).ok_or_else(|| {
             fail(format!(
                 "`{time}` is not a time; give seconds, or whole nanoseconds"
             ))
@@ -103,14 +109,17 @@ fn read_lines(path: &Path) -> Result<Vec<Line>, SurveyError> {
     Ok(lines)
 }
 
-/// Reads the times from the frames' names.
+/// Reads the times from the frames' names, in `unit`, or in that which the number of digits tells.
 ///
 /// # Errors
 /// The first frame whose name contains no time.
-pub(super) fn from_names(frames: &[FrameFile]) -> Result<Vec<f64>, SurveyError> {
+pub(super) fn from_names(
+    frames: &[FrameFile],
+    unit: Option<TimeUnit>,
+) -> Result<Vec<f64>, SurveyError> {
     let of_frame = |frame: &FrameFile| {
         let stem = frame.path.file_stem().unwrap_or_default().to_string_lossy();
-        times::from_name(&stem).ok_or_else(|| SurveyError::FrameTime {
+        times::from_name(&stem, unit).ok_or_else(|| SurveyError::FrameTime {
             frame: frame.index,
             file: frame.path.clone(),
         })
@@ -138,7 +147,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("times.txt");
         std::fs::write(&path, text).unwrap();
-        read(&path, &frames(&["a.png", "b.png"]))
+        read(&path, &frames(&["a.png", "b.png"]), None)
     }
 
     #[test]
@@ -178,10 +187,10 @@ mod tests {
     #[test]
     fn a_counter_is_no_time() {
         assert_eq!(
-            from_names(&frames(&["1.25.png", "1.5.png"])).unwrap(),
+            from_names(&frames(&["1.25.png", "1.5.png"]), None).unwrap(),
             [1.25, 1.5]
         );
-        let message = from_names(&frames(&["000001.png"]))
+        let message = from_names(&frames(&["000001.png"]), None)
             .unwrap_err()
             .to_string();
         assert!(

@@ -8,11 +8,15 @@ use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::read_tunnel_frame;
 
 /// Extensions of pictures in formats that are not read.
-const UNREAD_EXTENSIONS: [&str; 12] = [
-    "bmp", "dib", "gif", "pgm", "ppm", "pnm", "jp2", "heic", "heif", "hif", "avif", "dng",
+const UNREAD_EXTENSIONS: [&str; 16] = [
+    "bmp", "dib", "gif", "pgm", "ppm", "pnm", "pam", "pfm", "jp2", "jxl", "exr", "heic", "heif",
+    "hif", "avif", "dng",
 ];
 /// Extensions of files of measured points.
 const POINT_EXTENSIONS: [&str; 3] = ["ply", "las", "laz"];
+
+/// Files of COLMAP's models beside the cameras and the poses, without their extension.
+const MODEL_FILES: [&str; 3] = ["points3D", "frames", "rigs"];
 
 /// The beginnings of remedies and lists of what is known, which are left out of reasons.
 const REMEDIES: [&str; 3] = [";", ", expected", ": neither of"];
@@ -80,6 +84,9 @@ pub(super) fn reason_by_name(folder: &Path, file: &Path, extension: &str) -> Str
         let name = slashed(file);
         return format!("measured points: points = \"{name}\" under [tunnel] takes them");
     }
+    if let Some(reason) = part_of_model(&path) {
+        return reason;
+    }
     match extension {
         "gcsv" => "a log of a gyro: tunnelstitch gyro makes poses of it".to_owned(),
         "db3" => "a recording of ROS 2 in SQLite: ros2 bag convert makes MCAP of it".to_owned(),
@@ -95,6 +102,9 @@ pub(super) fn reason_of_text(folder: &Path, file: &Path, refusals: &[String]) ->
         let name = slashed(file);
         return format!("a frame of reference: tunnel_frame = \"{name}\" under [poses] takes it");
     }
+    if let Some(reason) = part_of_model(&path) {
+        return reason;
+    }
     let own = printed(&path).to_string();
     let shortened = |text: &String| {
         let text = text.replace(&format!("{own}: "), "");
@@ -104,6 +114,16 @@ pub(super) fn reason_of_text(folder: &Path, file: &Path, refusals: &[String]) ->
     };
     let refusals: Vec<String> = refusals.iter().map(shortened).collect();
     refusals.join("; ")
+}
+
+/// The reason why a file of a COLMAP model is left aside, if it is one beside its cameras.
+fn part_of_model(path: &Path) -> Option<String> {
+    let stem = path.file_stem()?.to_str()?;
+    let cameras = path
+        .with_file_name("cameras")
+        .with_extension(path.extension()?);
+    let is_part = MODEL_FILES.contains(&stem) && cameras.is_file();
+    is_part.then(|| "a part of COLMAP's model that is not needed".to_owned())
 }
 
 /// A relative path with slashes.

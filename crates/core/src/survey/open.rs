@@ -323,6 +323,8 @@ impl Survey {
             pictures: &self.frames,
             skipped: &self.skipped,
             times_s: self.times_s.as_deref(),
+            section: &self.file.frames,
+            camera: self.file.camera.first().name.as_deref(),
         }
     }
 

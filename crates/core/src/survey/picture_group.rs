@@ -6,11 +6,13 @@ use crate::frames::{
 use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::trajectory::times;
 
-/// The pictures of one folder with one extension.
+/// The pictures of one folder with one extension, in any capitals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureGroup {
     /// Glob pattern, relative to the searched folder.
     pub pattern: String,
+    /// The first picture, relative to the searched folder.
+    pub first: PathBuf,
     /// Number of pictures.
     pub count: usize,
     /// True if the name of the first picture has its time.
@@ -25,18 +27,18 @@ pub struct PictureGroup {
 }
 
 impl PictureGroup {
-    /// The group of the files of a folder's `parent` with an extension; `folder` is the searched
+    /// The group of the files of a folder's `parent` with one extension; `folder` is the searched
     /// one, to which paths are relative.
-    pub(super) fn of(folder: &Path, parent: &Path, extension: &str, files: &[&PathBuf]) -> Self {
+    pub(super) fn of(folder: &Path, parent: &Path, files: &[&PathBuf]) -> Self {
         // Names of folders may hold what a pattern gives a meaning.
         let parent = glob::Pattern::escape(&parent.to_string_lossy());
-        let pattern = Path::new(&parent).join(format!("*.{extension}"));
+        let pattern = Path::new(&parent).join(format!("*.{}", extension_pattern(files)));
         let path = files.first().map(|first| folder.join(first));
         let stem = path
             .as_deref()
             .and_then(Path::file_stem)
             .unwrap_or_default();
-        let names_time = times::from_name(&stem.to_string_lossy()).is_some();
+        let names_time = times::from_name(&stem.to_string_lossy(), None).is_some();
         let first = FrameFile::picture(0, path.unwrap_or_default());
         let size = first.size();
         let is_turned = first.exif_orientation().is_ok_and(|named| named.is_some());
@@ -46,6 +48,9 @@ impl PictureGroup {
         };
         Self {
             pattern: pattern.to_string_lossy().replace('\\', "/"),
+            first: files
+                .first()
+                .map_or_else(PathBuf::new, |first| first.to_path_buf()),
             count: files.len(),
             names_time,
             fault: size.as_ref().err().map(ToString::to_string),
@@ -55,6 +60,15 @@ impl PictureGroup {
                 false => None,
             },
         }
+    }
+
+    /// True for pictures beside those of another group, of their size and with other names: they
+    /// may belong to the same sequence.
+    pub fn may_continue(&self, frames: &Self) -> bool {
+        self.first.parent() == frames.first.parent()
+            && self.first.file_stem() != frames.first.file_stem()
+            && self.size.is_some()
+            && self.size == frames.size
     }
 
     /// The orientation that a calibration for pictures of `size` asks for, where EXIF data name
@@ -82,14 +96,61 @@ impl PictureGroup {
     }
 }
 
+/// The pattern of the extensions of files, which differ in capitals at most.
+fn extension_pattern(files: &[&PathBuf]) -> String {
+    let extension = |file: &&PathBuf| {
+        let extension = file.extension().unwrap_or_default();
+        extension.to_string_lossy().into_owned()
+    };
+    let mut extensions = files.iter().map(extension);
+    let first = extensions.next().unwrap_or_default();
+    if extensions.all(|other| other == first) {
+        return first;
+    }
+    let either = |c: char| format!("[{}{}]", c.to_ascii_lowercase(), c.to_ascii_uppercase());
+    first.chars().map(either).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn group_of(dir: &Path, names: &[&str]) -> PictureGroup {
+        let files: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
+        let files: Vec<&PathBuf> = files.iter().collect();
+        PictureGroup::of(dir, Path::new(""), &files)
+    }
+
+    #[test]
+    fn extensions_may_differ_in_capitals() {
+        let dir = tempfile::tempdir().unwrap();
+        let names = ["1.jpg", "2.JPG", "3.Jpg"];
+        for name in names {
+            image::GrayImage::new(8, 6)
+                .save(dir.path().join(name))
+                .unwrap();
+        }
+        let group = group_of(dir.path(), &names);
+        assert_eq!(group.pattern, "*.[jJ][pP][gG]");
+        let listed = list_frames(dir.path(), &group.pattern, None).unwrap();
+        assert_eq!(listed.len(), 3);
+        assert_eq!(group_of(dir.path(), &names[1..2]).pattern, "*.JPG");
+        // Of a sequence, and a copy.
+        image::GrayImage::new(8, 6)
+            .save(dir.path().join("4.png"))
+            .unwrap();
+        image::GrayImage::new(8, 6)
+            .save(dir.path().join("1.png"))
+            .unwrap();
+        assert!(group_of(dir.path(), &["4.png"]).may_continue(&group));
+        assert!(!group_of(dir.path(), &["1.png", "4.png"]).may_continue(&group));
+    }
 
     #[test]
     fn the_calibration_tells_the_orientation() {
         let group = |turned_size| PictureGroup {
             pattern: "*.jpg".to_owned(),
+            first: PathBuf::new(),
             count: 1,
             names_time: false,
             size: Some((64, 48)),
@@ -119,9 +180,7 @@ mod tests {
                 let picture = image::ImageBuffer::from_pixel(8, 6, image::Luma([value]));
                 picture.save(dir.path().join(format!("{k}.png"))).unwrap();
             }
-            let files = ["0.png", "1.png", "2.png"].map(PathBuf::from);
-            let files: Vec<&PathBuf> = files.iter().collect();
-            let group = PictureGroup::of(dir.path(), Path::new(""), "png", &files);
+            let group = group_of(dir.path(), &["0.png", "1.png", "2.png"]);
             assert_eq!(group.bits(dir.path(), None, (60000, 60000)), None);
             group.bits(dir.path(), None, (8, 6))
         };

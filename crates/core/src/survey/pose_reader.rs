@@ -2,6 +2,7 @@
 
 use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by_order, by_time};
 use super::error::SurveyError;
+use super::file::FramesSection;
 use super::frame_times;
 use super::interpreted_poses::InterpretedPoses;
 use super::missing_poses::{self, MissingPoses};
@@ -9,13 +10,14 @@ use super::pose_conflicts::{FrameConflict, frame_conflicts};
 use super::pose_shift::shifted;
 use super::poses_section::PosesSection;
 use super::skipped_frame::SkippedFrame;
+use super::unit_slip::{ClockReading, UnitSlip};
 use crate::frames::FrameFile;
 use std::borrow::Cow;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::{
-    Convention, Pose, PoseFile, PoseFormat, Trajectory, read_camera_in_body, read_poses_with,
-    read_tunnel_frame,
+    Convention, Pose, PoseFile, PoseFileOptions, PoseFormat, TimeUnit, Trajectory,
+    read_camera_in_body, read_poses_with, read_tunnel_frame,
 };
 
 /// The frames that poses are read for.
@@ -29,11 +31,16 @@ pub(super) struct FramesToPose<'a> {
     pub skipped: &'a [SkippedFrame],
     /// Times of the frames, seconds, if given by a file or a video.
     pub times_s: Option<&'a [f64]>,
+    /// The section of the frames, which tells how to read their times.
+    pub section: &'a FramesSection,
+    /// The name of the camera, if one is selected.
+    pub camera: Option<&'a str>,
 }
 
 /// A reader of pose files with the options of a [`PosesSection`].
 pub(super) struct PoseReader<'a> {
     section: &'a PosesSection,
+    folder: &'a Path,
     camera_in_body: Option<Pose>,
     tunnel_in_world: Option<Pose>,
     frames: FramesToPose<'a>,
@@ -46,15 +53,16 @@ impl<'a> PoseReader<'a> {
     /// A mount or a tunnel's frame that cannot be read.
     pub fn new(
         section: &'a PosesSection,
-        folder: &Path,
+        folder: &'a Path,
         frames: &FramesToPose<'a>,
     ) -> Result<Self, SurveyError> {
         let mount = section.body_to_camera.as_ref();
         let tunnel = section.tunnel_frame.as_ref();
         Ok(Self {
             section,
+            folder,
             camera_in_body: mount
-                .map(|file| read_camera_in_body(&folder.join(file)))
+                .map(|file| read_camera_in_body(&folder.join(file), frames.camera))
                 .transpose()?,
             tunnel_in_world: tunnel
                 .map(|file| read_tunnel_frame(&folder.join(file)))
@@ -97,6 +105,7 @@ impl<'a> PoseReader<'a> {
             pictures,
             skipped,
             times_s,
+            ..
         } = self.frames;
         let default = match file.format {
             PoseFormat::Recording => Associate::Time,
@@ -171,6 +180,7 @@ impl<'a> PoseReader<'a> {
     }
 
     /// Associates the poses of a file by the times of the frames, and names its contradictions.
+    /// Where they do not fit, but do in other units, the error names these.
     fn associate_by_time(
         &self,
         file: &PoseFile,
@@ -180,13 +190,59 @@ impl<'a> PoseReader<'a> {
             interpolate: self.section.interpolate.unwrap_or(false),
         };
         let frames = self.frames.frames;
-        let times_s = match self.frames.times_s {
-            Some(times_s) => Cow::Borrowed(times_s),
-            None => Cow::Owned(frame_times::from_names(frames)?),
-        };
-        let given = by_time(file, frames, &times_s, how)?;
+        let associated = self.frame_times().and_then(|times_s| {
+            let given = by_time(file, frames, &times_s, how)?;
+            Ok((given, times_s))
+        });
+        let (given, times_s) = associated.map_err(|error| match self.unit_slip(file, how) {
+            Some(slip) => SurveyError::Association {
+                path: file.path.clone(),
+                what: slip.to_string(),
+            },
+            None => error,
+        })?;
         let unit_m = self.section.unit_m.unwrap_or(1.0);
         Ok((given, frame_conflicts(file, &times_s, how, unit_m)))
+    }
+}
+
+impl PoseReader<'_> {
+    /// The times of the frames as their section says.
+    fn frame_times(&self) -> Result<Cow<'_, [f64]>, SurveyError> {
+        match self.frames.times_s {
+            Some(times_s) => Ok(Cow::Borrowed(times_s)),
+            None => {
+                let unit = self.frames.section.time_unit;
+                frame_times::from_names(self.frames.frames, unit).map(Cow::Owned)
+            }
+        }
+    }
+
+    /// Other units in which the times of the poses and those of the frames fit each other.
+    fn unit_slip(&self, file: &PoseFile, how: TimeAssociation) -> Option<UnitSlip> {
+        let FramesToPose {
+            frames, section, ..
+        } = self.frames;
+        let poses_in = |unit: TimeUnit| {
+            let options = PoseFileOptions {
+                time_unit: Some(unit),
+                ..self.section.file_options(false)
+            };
+            read_poses_with(&file.path, &options).ok()
+        };
+        let frames_in = |unit: TimeUnit| match (&section.times, self.frames.times_s) {
+            (Some(times), _) => {
+                frame_times::read(&self.folder.join(times), frames, Some(unit)).ok()
+            }
+            (None, None) => frame_times::from_names(frames, Some(unit)).ok(),
+            // A video or a recording has seconds.
+            (None, Some(_)) => None,
+        };
+        let as_given = ClockReading {
+            poses: Some(file.clone()),
+            frames: self.frame_times().ok().map(Cow::into_owned),
+        };
+        UnitSlip::find(as_given, frames, how, poses_in, frames_in)
     }
 }
 

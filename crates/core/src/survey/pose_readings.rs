@@ -26,8 +26,11 @@ const UNITS: [(&str, f64); 3] = [
 const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
 
 /// Radii of a round tunnel over the given one that are tried: a diameter is given for the radius,
-/// or half a radius.
-const RADIUS_FACTORS: [(f64, &str); 2] = [(0.5, "twice"), (2.0, "half")];
+/// or half a radius, and tenths of a decade on both sides of these, since frames agree with a
+/// radius near the right one, too. Nearer ones than that are for `refine` to find.
+const RADIUS_FACTORS: [f64; 6] = [0.4, 0.5, 0.63, 1.58, 2.0, 2.5];
+/// Prior of a radius that is off by another factor than two, nats: one in twenty.
+const OTHER_RADIUS_NATS: f64 = -3.0;
 
 /// Places that poses may be off by, later or earlier.
 const SHIFTS: [isize; 6] = [1, -1, 2, -2, 3, -3];
@@ -50,6 +53,8 @@ pub struct PoseReading {
     pub remedy: String,
     /// Number of its changes to the reading given.
     pub changes: usize,
+    /// Natural logarithm of its prior odds to a slip that people make often.
+    pub prior_nats: f64,
     /// The initial poses.
     pub initial: Trajectory,
     /// The orientation of the pictures against the one given.
@@ -66,6 +71,7 @@ impl PoseReading {
         Self {
             remedy,
             changes,
+            prior_nats: 0.0,
             initial,
             orientation: PictureOrientation::Stored,
             focal_factor: 1.0,
@@ -169,18 +175,19 @@ impl Survey {
         let has_scale = self.file.poses.unit_m.is_some() || !format.has_no_scale();
         let radius_m = tunnel.radius_m.filter(|_| is_straight && has_scale);
         let factors = RADIUS_FACTORS.into_iter();
-        factors.filter_map(move |(factor, given)| {
+        factors.filter_map(move |factor| {
             let radius_m = factor * radius_m?;
             let scaled = |stamped: &StampedPose| StampedPose {
                 pose: Pose::new(stamped.pose.r_wc, stamped.pose.t_wc / factor),
                 ..*stamped
             };
-            let remedy = format!(
-                "a tunnel of which {given} the radius is given (radius_m = {radius_m} under \
-                 [tunnel])"
-            );
+            let remedy = radius_remedy(factor, radius_m);
             let initial = self.initial.iter().map(scaled).collect();
-            let reading = PoseReading::of_poses(remedy, 1, initial);
+            let is_diameter = [0.5, 2.0].contains(&factor);
+            let reading = PoseReading {
+                prior_nats: if is_diameter { 0.0 } else { OTHER_RADIUS_NATS },
+                ..PoseReading::of_poses(remedy, 1, initial)
+            };
             is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)
         })
     }
@@ -211,6 +218,23 @@ fn shift_remedy(shift_frames: isize) -> String {
     let frames = if count == 1 { "frame" } else { "frames" };
     let direction = if shift_frames > 0 { "later" } else { "earlier" };
     format!("the poses {count} {frames} {direction} (shift_frames = {shift_frames} under [poses])")
+}
+
+/// Another radius, `factor` times the given one, and the line that gives it.
+fn radius_remedy(factor: f64, radius_m: f64) -> String {
+    let line = format!("(radius_m = {} under [tunnel])", rounded(radius_m));
+    if factor == 0.5 {
+        format!("a tunnel of which twice the radius is given {line}")
+    } else if factor == 2.0 {
+        format!("a tunnel of which half the radius is given {line}")
+    } else {
+        format!("a tunnel of about {factor} times the given radius {line}")
+    }
+}
+
+/// A length rounded to a tenth of a millimetre, without the digits of binary fractions.
+fn rounded(length_m: f64) -> f64 {
+    (length_m * 1e4).round() / 1e4
 }
 
 /// Readings of the file's text other than that of a section: the order of its quaternions and of

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use tunnelstitch_geometry::recordings::{PoseTopic, is_recording};
 use tunnelstitch_geometry::trajectory::{
     CameraAxes, ColumnMap, Direction, DuplicateTimes, PoseFileOptions, PoseFormat, QuaternionOrder,
+    TimeUnit,
 };
 
 /// `[poses]`. Defaults are detected from the files' content or given by the conventions of their
@@ -38,6 +39,10 @@ pub struct PosesSection {
     /// The order of the quaternion's numbers in TUM files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quaternion: Option<QuaternionOrder>,
+    /// The unit of times in TUM files, and in CSV files whose header does not tell; by default
+    /// numbers of 16 digits and more are nanoseconds, all others seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_unit: Option<TimeUnit>,
     /// The direction of the poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub convention: Option<Direction>,
@@ -114,6 +119,7 @@ impl PosesSection {
             format: self.format,
             columns: self.columns.clone(),
             quaternion: self.quaternion,
+            time_unit: self.time_unit,
             recorded: PoseTopic {
                 topic: self.topic.clone(),
                 parent: self.parent.clone(),

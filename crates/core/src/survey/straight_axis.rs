@@ -107,6 +107,7 @@ mod tests {
             let centre = Vector3::new(sway, 0.1 * f64::from(k), 0.0);
             let pose = frame.after(&Pose::new(turn, centre));
             PoseEntry {
+                camera: None,
                 name: Some(format!("f{k}.png")),
                 time_s: None,
                 pose: CameraAxes::OpenGl.turn(&Pose::new(pose.r_wc, pose.t_wc * scale)),

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use tunnelstitch_geometry::camera::{Camera, Cameras};
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::surface::{Surface, with_range};
-use tunnelstitch_geometry::trajectory::{Rig, read_camera_in_body};
+use tunnelstitch_geometry::trajectory::{Pose, Rig, is_rig_file, read_camera_in_body};
 
 /// The frames of a survey and the cameras that took them.
 pub(super) struct TakenFrames {
@@ -132,7 +132,12 @@ impl SurveyPlace<'_> {
                     "[[camera]] number {k} has no body_to_camera: the file of its place on the rig"
                 ))
             })?;
-            mounts.push(read_camera_in_body(&self.folder.join(mount))?);
+            let name = section.name.as_deref();
+            let camera_in_body = read_camera_in_body(&self.folder.join(mount), name)?;
+            // A model of COLMAP is in its own unit.
+            let unit_m = self.file.poses.unit_m.filter(|_| is_rig_file(mount));
+            let t_m = unit_m.unwrap_or(1.0) * camera_in_body.t_wc;
+            mounts.push(Pose::new(camera_in_body.r_wc, t_m));
         }
         self.check_same(&cameras, &lists)?;
         let (rotation_sigma_rad, translation_sigma_m) = (self.file.rig.unwrap_or_default())

@@ -1,6 +1,7 @@
 //! A commented `survey.toml` for the files of a folder.
 
 use super::discover::Discovery;
+use super::model_cameras::FoundRig;
 use super::straight_axis::AXIS_FILE;
 use std::fmt::Write;
 use std::path::Path;
@@ -51,7 +52,29 @@ impl Discovery {
         };
         text += "# ignore = [{ theta_deg = [150, 210], chainage_m = [2.0, 5.5] }]    # water, \
                  plants: refine ignores this part of the wall\n";
-        text += "\n[camera]\n";
+        match &self.rig {
+            Some(rig) => write_rig(rig, &mut text),
+            None => self.write_camera(&mut text),
+        }
+        self.write_frames(&mut text);
+        text += "\n[poses]\n";
+        self.write_initial_poses(&mut text);
+        if let Some((path, _)) = self.truth() {
+            let path = quoted(path);
+            let _ = writeln!(text, "truth = {path}      # only ever used to compare");
+        }
+        text += CONVENTIONS;
+        self.write_world(&mut text);
+        text += PRIOR;
+        if self.calibrations.is_empty() {
+            text += GUESSED_CAMERA;
+        }
+        text
+    }
+
+    /// Writes `[camera]`.
+    fn write_camera(&self, text: &mut String) {
+        *text += "\n[camera]\n";
         let _ = match self.calibrations.first() {
             Some(found) => {
                 let parts = self.parts_of(&found.path);
@@ -85,20 +108,6 @@ impl Discovery {
                 "readout_ms = {readout_ms}    # rolling shutter, as the video states it"
             );
         }
-        self.write_frames(&mut text);
-        text += "\n[poses]\n";
-        self.write_initial_poses(&mut text);
-        if let Some((path, _)) = self.truth() {
-            let path = quoted(path);
-            let _ = writeln!(text, "truth = {path}      # only ever used to compare");
-        }
-        text += CONVENTIONS;
-        self.write_world(&mut text);
-        text += PRIOR;
-        if self.calibrations.is_empty() {
-            text += GUESSED_CAMERA;
-        }
-        text
     }
 
     /// Writes `[frames]`.
@@ -106,6 +115,9 @@ impl Discovery {
         let pattern = self.pictures.first();
         let pattern = pattern.map_or("*.jpg", |group| &group.pattern);
         let _ = match (&self.video, &self.recorded) {
+            (None, None) if self.rig.is_some() => {
+                writeln!(text, "\n[frames]    # those of the cameras above")
+            }
             (Some(video), _) => writeln!(
                 text,
                 "\n[frames]\nvideo = {}\nevery = {}    # of its pictures; their times are the \
@@ -239,6 +251,22 @@ impl Discovery {
                       4 × 4 matrix).\n\
                       # body_to_camera = \"sensor.yaml\"\n";
         }
+    }
+}
+
+/// Writes the tables `[[camera]]` of a rig.
+fn write_rig(rig: &FoundRig, text: &mut String) {
+    *text += "\n# A rig: its cameras take one picture each at every moment.\n";
+    for camera in &rig.cameras {
+        // Writing into a string cannot fail.
+        let _ = writeln!(
+            text,
+            "[[camera]]\nfile = {}\nname = {}\nframes = {}\nbody_to_camera = {}\n",
+            quoted(&rig.calibrations),
+            quoted(&camera.name),
+            quoted(&camera.pattern),
+            quoted(&rig.path)
+        );
     }
 }
 

@@ -30,7 +30,8 @@ impl UnposedFrames {
         let FrameList {
             frames, times_s, ..
         } = FrameList::new(&file.frames_of(0), &toml_path, &folder, frame_times)?;
-        let times_s = times_s.or_else(|| frame_times::from_names(&frames).ok());
+        let unit = file.frames.time_unit;
+        let times_s = times_s.or_else(|| frame_times::from_names(&frames, unit).ok());
         Ok(Self { frames, times_s })
     }
 }

@@ -34,6 +34,14 @@ impl BinaryFile {
         self.at
     }
 
+    /// Reads a byte.
+    ///
+    /// # Errors
+    /// A file that ends before; an error of the operating system.
+    pub fn u8(&mut self) -> io::Result<u8> {
+        Ok(u8::from_le_bytes(self.bytes()?))
+    }
+
     /// Reads an unsigned number of 4 bytes.
     ///
     /// # Errors

@@ -59,7 +59,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
 
 fn parse_line(line: &str) -> Result<PoseEntry, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
-    let [_, qw, qx, qy, qz, tx, ty, tz, _, name @ ..] = words.as_slice() else {
+    let [_, qw, qx, qy, qz, tx, ty, tz, camera, name @ ..] = words.as_slice() else {
         return Err(format!("{} columns where `{FORM}` has 10", words.len()));
     };
     if name.is_empty() {
@@ -70,13 +70,12 @@ fn parse_line(line: &str) -> Result<PoseEntry, String> {
         *value = text::number(word, FORM)?;
     }
     let [qw, qx, qy, qz, tx, ty, tz] = values;
-    Ok(PoseEntry::named(
-        name.join(" "),
-        Pose::new(
-            text::rotation([qw, qx, qy, qz], "QW QX QY QZ")?,
-            Vector3::new(tx, ty, tz),
-        ),
-    ))
+    let rotation = text::rotation([qw, qx, qy, qz], "QW QX QY QZ")?;
+    let pose = Pose::new(rotation, Vector3::new(tx, ty, tz));
+    Ok(PoseEntry {
+        camera: camera.parse().ok(),
+        ..PoseEntry::named(name.join(" "), pose)
+    })
 }
 
 /// Checks that a line holds points or is empty.

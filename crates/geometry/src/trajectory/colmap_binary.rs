@@ -76,6 +76,7 @@ pub fn read(path: &Path) -> Result<Vec<PoseEntry>, PoseError> {
 /// An image as the file has it.
 struct ImageRecord {
     id: u32,
+    camera: u32,
     name: String,
     quaternion: [f64; 4],
     translation: [f64; 3],
@@ -85,12 +86,13 @@ impl ImageRecord {
     fn read(file: &mut BinaryFile) -> io::Result<Self> {
         let id = file.u32()?;
         let (quaternion, translation) = (file.f64s()?, file.f64s()?);
-        let _camera = file.u32()?;
+        let camera = file.u32()?;
         let name = file.name()?;
         let points = file.count(POINT_BYTES)?;
         file.skip(points as u64 * POINT_BYTES)?;
         Ok(Self {
             id,
+            camera,
             name,
             quaternion,
             translation,
@@ -107,13 +109,12 @@ impl ImageRecord {
         if self.name.is_empty() {
             return Err("there is no name, and so no frame for the pose".to_owned());
         }
-        Ok(PoseEntry::named(
-            self.name.clone(),
-            Pose::new(
-                text::rotation(self.quaternion, "qw qx qy qz")?,
-                Vector3::from(self.translation),
-            ),
-        ))
+        let rotation = text::rotation(self.quaternion, "qw qx qy qz")?;
+        let pose = Pose::new(rotation, Vector3::from(self.translation));
+        Ok(PoseEntry {
+            camera: Some(self.camera),
+            ..PoseEntry::named(self.name.clone(), pose)
+        })
     }
 }
 

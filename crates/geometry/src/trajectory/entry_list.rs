@@ -97,6 +97,7 @@ mod tests {
 
     fn entry(time_s: f64, x_m: f64) -> PoseEntry {
         PoseEntry {
+            camera: None,
             name: None,
             time_s: Some(time_s),
             pose: Pose::new(Default::default(), Vector3::new(x_m, 0.0, 0.0)),

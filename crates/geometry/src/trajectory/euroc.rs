@@ -5,6 +5,7 @@
 
 use super::entry_list::{DuplicateTimes, ParsedPoses};
 use super::error::PoseError;
+use super::nanoseconds::from_nanoseconds;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
 use super::{text, times};
@@ -39,13 +40,14 @@ fn parse_line(line: &str) -> Result<PoseEntry, String> {
     if pose.len() < 7 {
         return Err(format!("{} columns where `{FORM}` has 8", words.len()));
     }
-    let time_s = times::from_nanoseconds(time)?;
+    let time_s = from_nanoseconds(time)?;
     let mut values = [0.0; 7];
     for (value, word) in values.iter_mut().zip(pose) {
         *value = text::number(word, FORM)?;
     }
     let [x, y, z, qw, qx, qy, qz] = values;
     Ok(PoseEntry {
+        camera: None,
         name: None,
         time_s: Some(time_s),
         pose: Pose::new(

@@ -28,6 +28,7 @@ fn parse_line(line: &str) -> Result<PoseEntry, String> {
         _ => row::numbers(line, FORM)?,
     };
     Ok(PoseEntry {
+        camera: None,
         name: None,
         time_s: None,
         pose: rigid::from_rows(&[[a, b, c, d], [e, f, g, h], [i, j, k, l]])?,

@@ -7,6 +7,8 @@ use super::pose::Pose;
 pub struct PoseEntry {
     /// The name of its frame, if the file has names.
     pub name: Option<String>,
+    /// The camera of its frame in a model of COLMAP.
+    pub camera: Option<u32>,
     /// Its time in seconds, if the file has times.
     pub time_s: Option<f64>,
     /// The pose.
@@ -18,6 +20,7 @@ impl PoseEntry {
     pub(super) fn named(name: impl Into<String>, pose: Pose) -> Self {
         Self {
             name: Some(name.into()),
+            camera: None,
             time_s: None,
             pose,
         }

@@ -126,9 +126,9 @@ fn read_text(
     };
     let duplicates = options.duplicate_times;
     let parsed = match format {
-        PoseFormat::Tum => tum::parse(path, &text, options.quaternion, duplicates)?,
+        PoseFormat::Tum => tum::parse(path, &text, options)?,
         PoseFormat::Kitti => kitti::parse(path, &text)?.into(),
-        PoseFormat::Csv => csv::parse(path, &text, &options.columns, duplicates)?,
+        PoseFormat::Csv => csv::parse(path, &text, options)?,
         PoseFormat::Colmap => colmap::parse(path, &text)?.into(),
         PoseFormat::Nerfstudio => nerfstudio::parse(path, &text)?.into(),
         PoseFormat::Euroc => euroc::parse(path, &text, duplicates)?,

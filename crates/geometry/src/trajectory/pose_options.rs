@@ -4,6 +4,7 @@ use super::csv::ColumnMap;
 use super::entry_list::DuplicateTimes;
 use super::format::PoseFormat;
 use super::quaternion_order::QuaternionOrder;
+use super::time_unit::TimeUnit;
 use crate::recordings::PoseTopic;
 
 /// Options for reading a pose file. Those that do not concern its format have no effect.
@@ -16,6 +17,9 @@ pub struct PoseFileOptions {
     /// TUM: the order of the quaternion's numbers; by default the one that a comment names, or
     /// TUM's own.
     pub quaternion: Option<QuaternionOrder>,
+    /// TUM, and CSV whose header does not tell: the unit of times; by default numbers of 16 digits
+    /// and more are nanoseconds, all others seconds.
+    pub time_unit: Option<TimeUnit>,
     /// Recordings: the topic.
     pub recorded: PoseTopic,
     /// The handling of a time that two poses share.

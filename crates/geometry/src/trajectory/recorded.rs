@@ -53,6 +53,7 @@ fn chained(recording: &Recording, wanted: &PoseTopic) -> Result<Option<Vec<PoseE
     }
     let poses = TransformTree(tree).poses(&fixed, &frame).map_err(fail)?;
     let entry = |(time_s, pose): (f64, Pose)| PoseEntry {
+        camera: None,
         name: None,
         time_s: Some(time_s),
         pose,
@@ -86,6 +87,7 @@ fn entry(pose: &RecordedPose) -> Result<PoseEntry, String> {
         return Err("its numbers are not finite".to_owned());
     }
     Ok(PoseEntry {
+        camera: None,
         name: None,
         time_s: Some(pose.time_s),
         pose: Pose::new(text::rotation([w, x, y, z], "x y z w")?, position),

@@ -3,6 +3,7 @@
 use super::entry_list::{DuplicateTimes, EntryList, ParsedPoses};
 use super::error::PoseError;
 use super::pose_entry::PoseEntry;
+use super::time_unit::TimeUnit;
 use super::times;
 use crate::files::limits::MAX_TABLE_BYTES;
 use crate::files::{decode_text, read_regular};
@@ -65,11 +66,11 @@ pub fn finite(word: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("`{word}` is not a finite number"))
 }
 
-/// Parses a time, seconds; whole numbers of 16 digits and more are nanoseconds. `form` describes
-/// the line for the error message.
-pub(super) fn time(word: &str, form: &str) -> Result<f64, String> {
+/// Parses a time in `unit`, to seconds; without one, whole numbers of 16 digits and more are
+/// nanoseconds, all others seconds. `form` describes the line for the error message.
+pub(super) fn time(word: &str, unit: Option<TimeUnit>, form: &str) -> Result<f64, String> {
     number(word, form)?;
-    times::from_word(word)
+    times::from_word(word, unit)
         .ok_or_else(|| format!("`{word}` is not a time; give seconds, or whole nanoseconds"))
 }
 

@@ -1,17 +1,20 @@
 //! TUM: lines `time tx ty tz qx qy qz qw`, seconds and metres, camera-to-world.
 //!
-//! Times of 16 digits and more are nanoseconds, as ORB-SLAM3 writes them. Commas, semicolons and
-//! tabs may separate, and a comment before the first pose may name `qw` first.
+//! Times of 16 digits and more are nanoseconds, as ORB-SLAM3 writes them, and a comment may name
+//! another unit, as `[ms]`. Commas, semicolons and tabs may separate, and a comment before the
+//! first pose may name `qw` first.
 //!
 //! The program's own format. It is written with eight columns, single spaces and no trailing space,
 //! as `evo` requires.
 
-use super::entry_list::{DuplicateTimes, ParsedPoses};
+use super::entry_list::ParsedPoses;
 use super::error::PoseError;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
+use super::pose_options::PoseFileOptions;
 use super::quaternion_order::QuaternionOrder;
 use super::stamped_pose::{StampedPose, Trajectory};
+use super::time_unit::TimeUnit;
 use super::{row, text};
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -27,7 +30,7 @@ pub(super) const FORM: &str = "time tx ty tz qx qy qz qw";
 /// quaternion of length zero (or farther than 1 % from unit length); times that do not increase; no
 /// pose at all.
 pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
-    let parsed = parse(path, &text::read(path)?, None, DuplicateTimes::Refuse)?;
+    let parsed = parse(path, &text::read(path)?, &PoseFileOptions::default())?;
     let entries = parsed.entries;
     if entries.is_empty() {
         return Err(PoseError::file(path, "holds no poses"));
@@ -39,21 +42,28 @@ pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
     Ok(entries.into_iter().map(stamped).collect())
 }
 
-/// Parses a TUM file; without an `order` of the quaternion, the comments before the first pose name
-/// it, or it is TUM's own.
+/// Parses a TUM file; without options for the order of the quaternion and the unit of times,
+/// comments name them, or they are TUM's own.
 pub(super) fn parse(
     path: &Path,
     text: &str,
-    order: Option<QuaternionOrder>,
-    duplicates: DuplicateTimes,
+    options: &PoseFileOptions,
 ) -> Result<ParsedPoses, PoseError> {
-    let order = order
+    let order = options
+        .quaternion
         .or_else(|| QuaternionOrder::of_comments(text))
         .unwrap_or_default();
-    text::stamped_lines(path, text, duplicates, |line| parse_line(line, order))
+    let unit = options.time_unit.or_else(|| TimeUnit::of_comments(text));
+    text::stamped_lines(path, text, options.duplicate_times, |line| {
+        parse_line(line, order, unit)
+    })
 }
 
-fn parse_line(line: &str, order: QuaternionOrder) -> Result<PoseEntry, String> {
+fn parse_line(
+    line: &str,
+    order: QuaternionOrder,
+    unit: Option<TimeUnit>,
+) -> Result<PoseEntry, String> {
     let [time, pose @ ..]: [Cow<'_, str>; 8] = row::exact_words(line, FORM)?;
     let mut values = [0.0; 7];
     for (value, word) in values.iter_mut().zip(&pose) {
@@ -61,8 +71,9 @@ fn parse_line(line: &str, order: QuaternionOrder) -> Result<PoseEntry, String> {
     }
     let [tx, ty, tz, a, b, c, d] = values;
     Ok(PoseEntry {
+        camera: None,
         name: None,
-        time_s: Some(text::time(&time, FORM)?),
+        time_s: Some(text::time(&time, unit, FORM)?),
         pose: Pose::new(
             text::rotation(order.wxyz([a, b, c, d]), order.columns())?,
             Vector3::new(tx, ty, tz),

@@ -179,6 +179,11 @@ impl fmt::Display for RejectionReason {
                  many do not"
             ),
             Self::Unsolved => write!(f, "the equations of the survey have no solution"),
+            Self::Uncertain { wall_px } if !wall_px.is_finite() => write!(
+                f,
+                "the other frames do not tell its position on the wall: too little texture, or \
+                 frames that do not match"
+            ),
             Self::Uncertain { wall_px } => write!(
                 f,
                 "its position on the wall is uncertain by {wall_px:.1} px: too little texture, \

@@ -73,7 +73,8 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
     Ok(name(found))
 }
 
-/// Readings that evenly distributed pairs agree with.
+/// Readings that evenly distributed pairs agree with. Those that are improbable from the beginning
+/// compete with the others, and are tried only where one of these fits.
 fn among_all_pairs<'r>(
     survey: &Survey,
     given: &PoseReading,
@@ -91,9 +92,16 @@ fn among_all_pairs<'r>(
         least_nats,
         min_pair_nats: 0.0,
     };
+    let is_usual = |reading: &&&PoseReading| reading.prior_nats >= 0.0;
+    let (usual, rivals): (Vec<_>, Vec<_>) = others.iter().partition(is_usual);
     let mut found = Vec::new();
-    for reading in others {
-        found.extend(compare(&mut pictures, &comparison, reading)?);
+    for readings in [usual, rivals] {
+        for reading in readings {
+            found.extend(compare(&mut pictures, &comparison, reading)?);
+        }
+        if found.is_empty() {
+            break;
+        }
     }
     Ok(found)
 }
@@ -164,7 +172,7 @@ fn compare<'r>(
         return Ok(None);
     }
     let registered = pictures.register(reading, |some| comparison.may_take(some))?;
-    let log_odds = comparison.log_odds(&registered, reading.changes_lens());
+    let log_odds = reading.prior_nats + comparison.log_odds(&registered, reading.changes_lens());
     let is_taken = comparison.may_take(&registered) && log_odds > comparison.least_nats;
     Ok(is_taken.then(|| Found {
         reading,

@@ -100,6 +100,7 @@ mod tests {
         PoseReading {
             remedy: String::new(),
             changes: 1,
+            prior_nats: 0.0,
             initial: (0..=steps).map(stamped).collect(),
             orientation: PictureOrientation::Stored,
             shift_frames,

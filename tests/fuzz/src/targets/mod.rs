@@ -14,6 +14,7 @@ pub mod marks;
 pub mod names;
 pub mod pictures;
 pub mod plan;
+pub mod points;
 pub mod poses;
 pub mod recordings;
 pub mod refinement;
@@ -28,7 +29,7 @@ pub mod words;
 pub type Target = fn(&[u8]);
 
 /// All targets by their names.
-pub const TARGETS: [(&str, Target); 22] = [
+pub const TARGETS: [(&str, Target); 23] = [
     ("calibration", calibration::run),
     ("centreline", centreline::run),
     ("checkpoint", checkpoint::run),
@@ -42,6 +43,7 @@ pub const TARGETS: [(&str, Target); 22] = [
     ("names", names::run),
     ("pictures", pictures::run),
     ("plan", plan::run),
+    ("points", points::run),
     ("poses", poses::run),
     ("recordings", recordings::run),
     ("refinement", refinement::run),

@@ -2,6 +2,7 @@
 
 use super::pose_column::{ColumnMap, PoseColumn};
 use super::title::Title;
+use crate::trajectory::time_unit::TimeUnit;
 use csv::StringRecord;
 
 /// The columns that this program writes.
@@ -20,8 +21,9 @@ pub(super) struct Columns {
 /// Indices of the columns of a time.
 #[derive(Clone, Copy)]
 pub(super) enum TimeColumn {
-    /// Seconds, or whole numbers of 16 digits and more, which are nanoseconds.
-    Seconds(usize),
+    /// Numbers of a unit; without one, seconds, or whole numbers of 16 digits and more, which are
+    /// nanoseconds.
+    One(usize, Option<TimeUnit>),
     /// Whole nanoseconds.
     Nanoseconds(usize),
     /// Whole seconds, and the nanoseconds to add.
@@ -112,7 +114,15 @@ impl Titles<'_> {
     fn find_time(&self) -> Result<Option<TimeColumn>, String> {
         let position = |is: fn(&Title) -> bool| self.titles.iter().position(is);
         if let Some(index) = self.find(PoseColumn::TimeS)? {
-            return Ok(Some(TimeColumn::Seconds(index)));
+            return Ok(Some(TimeColumn::One(index, None)));
+        }
+        for (column, unit) in [
+            (PoseColumn::TimeMs, TimeUnit::Ms),
+            (PoseColumn::TimeUs, TimeUnit::Us),
+        ] {
+            if let Some(index) = self.find(column)? {
+                return Ok(Some(TimeColumn::One(index, Some(unit))));
+            }
         }
         if let Some(index) = self.find(PoseColumn::TimeNs)? {
             return Ok(Some(TimeColumn::Nanoseconds(index)));

@@ -12,6 +12,10 @@ pub enum PoseColumn {
     Frame,
     /// Time, seconds.
     TimeS,
+    /// Time, milliseconds.
+    TimeMs,
+    /// Time, microseconds.
+    TimeUs,
     /// Time, whole nanoseconds.
     TimeNs,
     /// Translation along x, metres.
@@ -35,9 +39,11 @@ pub type ColumnMap = BTreeMap<PoseColumn, String>;
 
 impl PoseColumn {
     /// All columns.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Frame,
         Self::TimeS,
+        Self::TimeMs,
+        Self::TimeUs,
         Self::TimeNs,
         Self::Tx,
         Self::Ty,
@@ -49,7 +55,7 @@ impl PoseColumn {
     ];
     /// The columns that every table needs.
     pub(super) const POSE: [Self; 7] = {
-        let [_frame, _time_s, _time_ns, pose @ ..] = Self::ALL;
+        let [_frame, _s, _ms, _us, _ns, pose @ ..] = Self::ALL;
         pose
     };
 
@@ -58,6 +64,8 @@ impl PoseColumn {
         match self {
             Self::Frame => "frame",
             Self::TimeS => "time_s",
+            Self::TimeMs => "time_ms",
+            Self::TimeUs => "time_us",
             Self::TimeNs => "time_ns",
             Self::Tx => "tx",
             Self::Ty => "ty",

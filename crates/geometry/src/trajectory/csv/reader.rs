@@ -3,13 +3,15 @@
 use super::cells::name_from_cell;
 use super::columns::{Columns, FORM, TimeColumn};
 use super::header::Header;
-use super::pose_column::ColumnMap;
 use super::table::split;
-use crate::trajectory::entry_list::{DuplicateTimes, EntryList, ParsedPoses};
+use crate::trajectory::entry_list::{EntryList, ParsedPoses};
 use crate::trajectory::error::PoseError;
+use crate::trajectory::nanoseconds::from_nanoseconds;
 use crate::trajectory::pose::Pose;
 use crate::trajectory::pose_entry::PoseEntry;
-use crate::trajectory::{text, times};
+use crate::trajectory::pose_options::PoseFileOptions;
+use crate::trajectory::text;
+use crate::trajectory::time_unit::TimeUnit;
 use csv::StringRecord;
 use nalgebra::Vector3;
 use std::borrow::Cow;
@@ -18,9 +20,9 @@ use std::path::Path;
 pub(crate) fn parse(
     path: &Path,
     text: &str,
-    map: &ColumnMap,
-    duplicates: DuplicateTimes,
+    options: &PoseFileOptions,
 ) -> Result<ParsedPoses, PoseError> {
+    let map = &options.columns;
     let Some(header) = Header::find(text, map).or_else(|| Header::first_line(text)) else {
         return Ok(ParsedPoses::default());
     };
@@ -30,8 +32,9 @@ pub(crate) fn parse(
         columns: Columns::of(&titles, map).map_err(fail(header.number))?,
         count: titles.len(),
         separator: header.separator,
+        time_unit: options.time_unit,
     };
-    let mut entries = EntryList::new(duplicates);
+    let mut entries = EntryList::new(options.duplicate_times);
     let mut names = text::Names::default();
     for (number, line) in header.records(text) {
         row.read(line)
@@ -53,6 +56,8 @@ struct RowReader {
     /// Number of columns.
     count: usize,
     separator: u8,
+    /// Unit of the times whose column does not tell.
+    time_unit: Option<TimeUnit>,
 }
 
 impl RowReader {
@@ -84,6 +89,7 @@ impl RowReader {
             return Err("the frame has no name".to_owned());
         }
         Ok(PoseEntry {
+            camera: None,
             name: name.map(|name| name_from_cell(name).to_owned()),
             time_s: self.time(&record)?,
             pose: Pose::new(
@@ -100,10 +106,12 @@ impl RowReader {
         };
         let word = |column| self.number_in(record, column);
         Ok(Some(match columns {
-            TimeColumn::Seconds(column) => text::time(&word(column), FORM)?,
-            TimeColumn::Nanoseconds(column) => times::from_nanoseconds(&word(column))?,
+            TimeColumn::One(column, unit) => {
+                text::time(&word(column), unit.or(self.time_unit), FORM)?
+            }
+            TimeColumn::Nanoseconds(column) => from_nanoseconds(&word(column))?,
             TimeColumn::Parts(seconds, nanoseconds) => {
-                text::number(&word(seconds), FORM)? + times::from_nanoseconds(&word(nanoseconds))?
+                text::number(&word(seconds), FORM)? + from_nanoseconds(&word(nanoseconds))?
             }
         }))
     }
@@ -121,7 +129,7 @@ mod tests {
     use crate::trajectory::stamped_pose::StampedPose;
 
     fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
-        let parsed = super::parse(path, text, &ColumnMap::new(), DuplicateTimes::Refuse)?;
+        let parsed = super::parse(path, text, &PoseFileOptions::default())?;
         Ok(parsed.entries)
     }
 

@@ -1,6 +1,7 @@
 //! Names that this program, ROS and EuRoC give to the columns of poses.
 
 use super::pose_column::PoseColumn;
+use crate::trajectory::time_unit::TimeUnit;
 
 const FRAME: &[&str] = &[
     "frame",
@@ -18,7 +19,6 @@ const TIMES: [&[&str]; 3] = [
     &["time_s", "time", "timestamp", "timestamp_s"],
     &["stamp", "t", "rosbagtimestamp"],
 ];
-const TIMES_NS: &[&str] = &["time_ns", "timestamp_ns"];
 /// Words before an axis in the names of translations and rotations, as in
 /// `pose.pose.position.x`.
 const TRANSLATIONS: &[&str] = &["position", "translation", "pos"];
@@ -61,12 +61,11 @@ impl Title {
         let has_unit = |units: &[&str]| units.contains(&self.unit.as_str());
         match column {
             PoseColumn::Frame => (is(FRAME) && has_unit(&[""])).then_some(0),
-            PoseColumn::TimeS if has_unit(&["", "s", "sec", "seconds"]) => {
-                TIMES.iter().position(|names| is(names))
-            }
-            PoseColumn::TimeNs if has_unit(&["ns"]) => TIMES.iter().position(|names| is(names)),
-            PoseColumn::TimeNs => (is(TIMES_NS) && has_unit(&[""])).then_some(0),
-            PoseColumn::TimeS => None,
+            PoseColumn::TimeS if has_unit(&[""]) => TIMES.iter().position(|names| is(names)),
+            PoseColumn::TimeS => self.rank_of_time(TimeUnit::S),
+            PoseColumn::TimeMs => self.rank_of_time(TimeUnit::Ms),
+            PoseColumn::TimeUs => self.rank_of_time(TimeUnit::Us),
+            PoseColumn::TimeNs => self.rank_of_time(TimeUnit::Ns),
             PoseColumn::Tx => self.rank_of_translation("x"),
             PoseColumn::Ty => self.rank_of_translation("y"),
             PoseColumn::Tz => self.rank_of_translation("z"),
@@ -92,6 +91,17 @@ impl Title {
     /// True for an angle about an axis, such as `roll_deg` or `pose.yaw`.
     pub fn is_angle(&self) -> bool {
         self.name.split('_').any(|word| ANGLES.contains(&word))
+    }
+
+    /// The rank of a time in a unit that brackets or the last word of the name tell; `stamp_secs`
+    /// is a part of one.
+    fn rank_of_time(&self, unit: TimeUnit) -> Option<usize> {
+        let name = match (self.unit.as_str(), self.name.rsplit_once('_')) {
+            ("", Some((name, last))) if unit.name() == last => name,
+            (own, _) if unit.is_called(own) => self.name.as_str(),
+            _ => return None,
+        };
+        TIMES.iter().position(|names| names.contains(&name))
     }
 
     fn rank_of_translation(&self, axis: &str) -> Option<usize> {
@@ -150,7 +160,7 @@ mod tests {
 
     #[test]
     fn names_of_ros_and_euroc_are_known() {
-        use PoseColumn::{Frame, Qw, Qx, TimeNs, TimeS, Tx, Ty, Tz};
+        use PoseColumn::{Frame, Qw, Qx, TimeMs, TimeNs, TimeS, TimeUs, Tx, Ty, Tz};
         for (text, column) in [
             ("field.pose.position.x", Tx),
             ("pose.position.y", Ty),
@@ -169,6 +179,11 @@ mod tests {
             ("header.stamp", TimeS),
             ("__time", TimeS),
             ("#timestamp [ns]", TimeNs),
+            ("time_ns", TimeNs),
+            ("time [ms]", TimeMs),
+            ("timestamp_ms", TimeMs),
+            ("t (µs)", TimeUs),
+            ("time (sec)", TimeS),
             ("image_name", Frame),
         ] {
             assert!(Title::of(text).rank(column).is_some(), "{text}");
