@@ -16,7 +16,8 @@ fn simulate(out: &Path, size: &str, more: &[&str]) {
     support::simulate(out, &[&size[..], &speed, more].concat());
 }
 
-/// Refines a survey with its wall as given; returns the result of the rolling-shutter test and the warnings.
+/// Refines a survey with its wall as given; returns the result of the rolling-shutter test and the
+/// warnings.
 fn refine(survey: &Path, out: &Path) -> (Value, String) {
     let refine = ["refine", text(survey), "--out", text(out)];
     let output = tunnelstitch(&[&refine[..], &["--shape", "fixed"]].concat());
