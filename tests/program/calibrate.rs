@@ -58,7 +58,7 @@ fn assert_honest(unknown: &serde_json::Value, truth: f64) {
 /// the refined poses.
 #[test]
 fn a_wrong_focal_length_is_found_and_the_result_is_a_survey() {
-    let dir = first_frames(24);
+    let dir = first_frames(16);
     let out = dir.path().join("out");
     scale_focal(dir.path(), 1.02);
     let focal = calibrate(dir.path(), &out, "focal")("focal");

@@ -31,7 +31,7 @@ fn a_sweep_is_written_resumed_and_drawn() {
 fn the_efficiency_is_measured_against_the_bound() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("limit");
-    let options = "--efficiency --frames 14 --size 240x180 --seeds 1 --wall concrete --quiet";
+    let options = "--efficiency --frames 12 --size 160x120 --seeds 1 --wall concrete --quiet";
     let mut arguments = vec!["converge", "--out", text(&out)];
     arguments.extend(options.split(' '));
     succeed(&arguments);

@@ -16,7 +16,7 @@ const SHAFT: &str = "12";
 /// A brick tunnel in small frames, by default two turns of it.
 fn simulated(folder: &Path, name: &str, more: &[&str]) -> std::path::PathBuf {
     let out = folder.join(name);
-    let mut options = vec!["--supersample", "3", "--size", "320x240"];
+    let mut options = vec!["--size", "240x180"];
     if !more.contains(&"--frames") {
         options.extend(["--turns", "2"]);
     }
@@ -112,7 +112,7 @@ fn panorama(survey: &Path, more: &[&str]) -> image::GrayAlphaImage {
         "--poses",
         "truth",
         "--px-per-metre",
-        "60",
+        "45",
         "--quiet",
         "--out",
         text(&out),
@@ -219,7 +219,7 @@ fn a_masked_pixel_shows_no_point() {
         "[poses]",
         "mask = \"mask.png\"\n[poses]",
     );
-    let message = fail(&["locate", text(&survey), "--frame", "3,130,200"], 3);
+    let message = fail(&["locate", text(&survey), "--frame", "3,98,150"], 3);
     assert!(message.contains("frames.mask"), "{message}");
 }
 
@@ -259,6 +259,7 @@ fn a_mask_is_recognised_reported_recorded_and_kept() {
         text(&survey),
         "--out",
         text(&out),
+        "--fast",
         "--calibrate",
         "focal",
         "--quiet",

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 const SAID: &str = "% of the picture does not move with the wall: left out";
 
 /// Two turns of small frames.
-fn simulated(folder: &Path, name: &str, more: &str) -> PathBuf {
+fn simulated(folder: &Path, name: &str, size: &str, more: &str) -> PathBuf {
     let out = folder.join(name);
-    let options = "--frames 24 --size 240x180 --supersample 2 ".to_owned() + more;
+    let options = format!("--frames 24 --size {size} --supersample 2 {more}");
     simulate(&out, &options.split_whitespace().collect::<Vec<_>>());
     out
 }
@@ -33,7 +33,12 @@ fn shares(mask: &GrayImage, truth: &GrayImage) -> [f64; 2] {
 #[test]
 fn an_overlay_is_proposed_as_a_mask_that_is_not_replaced() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = simulated(dir.path(), "survey", "--wall concrete --overlay both");
+    let survey = simulated(
+        dir.path(),
+        "survey",
+        "240x180",
+        "--wall concrete --overlay both",
+    );
     let mask = survey.join("mask.png");
     let check = ["check", text(&survey), "--write-mask", text(&mask)];
     let said = succeed(&check);
@@ -64,7 +69,12 @@ fn an_overlay_is_proposed_as_a_mask_that_is_not_replaced() {
 #[test]
 fn refine_compare_and_report_leave_an_overlay_out_and_say_so() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = simulated(dir.path(), "survey", "--wall concrete --overlay text");
+    let survey = simulated(
+        dir.path(),
+        "survey",
+        "240x180",
+        "--wall concrete --overlay text",
+    );
     let [out, report] = ["refined", "report"].map(|name| dir.path().join(name));
     let refine = ["refine", text(&survey), "--out", text(&out)];
     let said = succeed(&refine);
@@ -90,6 +100,8 @@ fn refine_compare_and_report_leave_an_overlay_out_and_say_so() {
         text(&poses),
         "--out",
         text(&compared),
+        "--px-per-metre",
+        "20",
     ];
     assert!(succeed(&compare).contains(SAID));
     let error = json(&compared.join("compare.json"))["refined"]["wall"]["px"]["rms"].clone();
@@ -113,8 +125,8 @@ fn difference(a: &Path, b: &Path) -> f64 {
 #[test]
 fn a_panorama_shows_the_wall_unless_the_overlay_is_kept() {
     let dir = tempfile::tempdir().unwrap();
-    let clean = simulated(dir.path(), "clean", "");
-    let burnt = simulated(dir.path(), "burnt", "--overlay text");
+    let clean = simulated(dir.path(), "clean", "240x180", "");
+    let burnt = simulated(dir.path(), "burnt", "240x180", "--overlay text");
     let stitch = |survey: &Path, name: &str| {
         let out = dir.path().join(name);
         let said = succeed(&[
@@ -147,7 +159,12 @@ fn a_panorama_shows_the_wall_unless_the_overlay_is_kept() {
 #[test]
 fn a_survey_that_hardly_moves_is_not_examined() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = simulated(dir.path(), "survey", "--turn-deg 0.2 --advance-m 0.0005");
+    let survey = simulated(
+        dir.path(),
+        "survey",
+        "160x120",
+        "--turn-deg 0.2 --advance-m 0.0005",
+    );
     let mask = dir.path().join("mask.png");
     let said = succeed(&["check", text(&survey), "--write-mask", text(&mask)]);
     assert!(
@@ -167,7 +184,7 @@ fn interlaced_frames_are_named_with_the_remedy() {
             ""
         };
         let options = format!("--wall {wall}{effects} --force");
-        let survey = simulated(dir.path(), "survey", &options);
+        let survey = simulated(dir.path(), "survey", "160x120", &options);
         let said = tunnelstitch(&["check", text(&survey)]).stderr;
         let said = String::from_utf8_lossy(&said).into_owned();
         assert_eq!(

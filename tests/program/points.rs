@@ -83,7 +83,8 @@ fn wall_px(name: &str) -> f64 {
     let dir = tempfile::tempdir().unwrap();
     let (survey, poses) = (path("survey"), path(name).join("poses.tum"));
     let arguments = ["compare", text(&survey), "--refined", text(&poses), "--out"];
-    succeed(&[&arguments[..], &[text(dir.path()), "--quiet"]].concat());
+    let coarse = [text(dir.path()), "--px-per-metre", "20", "--quiet"];
+    succeed(&[&arguments[..], &coarse].concat());
     let refined = json(&dir.path().join("compare.json"))["refined"].clone();
     refined["wall"]["px"]["rms"].as_f64().unwrap()
 }

@@ -523,8 +523,9 @@ fn wrong_conventions_are_named_with_their_flags() {
 /// named flag corrects it.
 #[test]
 fn what_only_pictures_can_tell_is_named_by_refine() {
-    let survey = first_frames(14);
-    let dir = survey.path();
+    let scratch = tempfile::tempdir().unwrap();
+    let dir = &scratch.path().join("survey");
+    simulate(dir, &["--frames", "14", "--size", "160x120"]);
     let path = dir.join("baseline.tum");
     let planned = tum::read(&path).unwrap();
     write_tum(&path, mapped(&planned, Pose::inverse));

@@ -60,10 +60,11 @@ fn checked(survey: &Path) -> Value {
     said
 }
 
-/// Refines a survey and stitches it; returns the poses and the panorama.
+/// Refines a survey with its wall as given and stitches it; returns the poses and the panorama.
 fn refined(survey: &Path) -> (Vec<u8>, DynamicImage) {
     let out = survey.join("refined");
-    succeed(&["refine", text(survey), "--out", text(&out), "--quiet"]);
+    let refine = ["refine", text(survey), "--out", text(&out), "--quiet"];
+    succeed(&[&refine[..], &["--shape", "fixed", "--fast"]].concat());
     let (poses, panorama) = (out.join("poses.tum"), survey.join("panorama.png"));
     let stitch = ["stitch", text(survey), "--poses", text(&poses)];
     let options = ["--out", text(&panorama), "--px-per-metre", "40", "--quiet"];

@@ -1,28 +1,37 @@
 //! Refinement of the Blender-rendered fixture through the program, judged against the true poses.
 
 use crate::support::{
-    self, first_frames, json, refine_blender_survey, refined_blender_survey, simulate, succeed,
-    text, tunnelstitch,
+    self, first_frames, json, refined_blender_survey, simulate, succeed, text, tunnelstitch,
 };
 use std::path::Path;
 
 #[test]
-fn the_fixture_is_repaired_and_any_number_of_threads_gives_the_same_bytes() {
+fn any_number_of_threads_gives_the_same_bytes() {
     let dir = tempfile::tempdir().unwrap();
-    let (one, two) = (dir.path().join("1"), refined_blender_survey());
-    refine_blender_survey(&one, 1);
-    let poses = std::fs::read(one.join("poses.tum")).unwrap();
-    assert_eq!(poses, std::fs::read(two.join("poses.tum")).unwrap());
+    let survey = dir.path().join("survey");
+    simulate(&survey, &["--frames", "14", "--size", "160x120"]);
+    let refined = |threads: &str| {
+        let out = dir.path().join(threads);
+        let refine = ["refine", text(&survey), "--out", text(&out), "--quiet"];
+        succeed(&[&refine[..], &["--threads", threads]].concat());
+        ["poses.tum", "covariance.csv"].map(|name| std::fs::read(out.join(name)).unwrap())
+    };
+    let one = refined("1");
+    assert!(["2", "3"].iter().all(|threads| refined(threads) == one));
+}
 
+#[test]
+fn the_fixture_is_repaired() {
+    let refined = refined_blender_survey();
     // The format that evo reads: eight columns, single spaces, no trailing space.
-    let poses = String::from_utf8(poses).unwrap();
+    let poses = std::fs::read_to_string(refined.join("poses.tum")).unwrap();
     assert_eq!(poses.lines().count(), 48);
     for line in poses.lines() {
         assert_eq!(line.split(' ').count(), 8, "{line:?}");
         assert!(line.split(' ').all(|word| word.parse::<f64>().is_ok()));
     }
 
-    let report = json(&one.join("refine.json"));
+    let report = json(&refined.join("refine.json"));
     assert_eq!(report["frames"].as_array().unwrap().len(), 48);
     assert_eq!(report["frames_on_prior"], 0);
     for level in report["levels"].as_array().unwrap() {
@@ -145,12 +154,13 @@ fn photometric_wall_px(survey: &Path, out: &Path) -> f64 {
     error.unwrap().px.rms
 }
 
-/// Simulates and refines; returns the folder with `survey` and `out`.
+/// Simulates and refines with the wall as given; returns the folder with `survey` and `out`.
 fn simulate_and_refine(options: &[&str]) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     simulate(&survey, options);
-    succeed(&["refine", text(&survey), "--out", text(&out), "--quiet"]);
+    let refine = ["refine", text(&survey), "--out", text(&out), "--quiet"];
+    succeed(&[&refine[..], &["--shape", "fixed"]].concat());
     dir
 }
 
@@ -258,14 +268,14 @@ fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
 /// with every pair of frames consistent.
 #[test]
 fn a_turn_closes_on_the_right_tile() {
-    let options = "--wall tiled-brick --frames 60 --size 320x240 --seed 2 --jitter random-walk \
+    let options = "--wall tiled-brick --frames 36 --size 240x180 --seed 2 --jitter random-walk \
                    --rotation-sigma-deg 2 --translation-sigma-m 0.02,0.02,0.03";
     let dir = simulate_and_refine(&options.split_whitespace().collect::<Vec<_>>());
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     let report = json(&out.join("refine.json"));
     let frames = report["frames"].as_array().unwrap();
     let believed = frames.iter().filter(|f| f["flag"] == "photometric");
-    assert_eq!(believed.count(), 60);
+    assert_eq!(believed.count(), 36);
     let px = photometric_wall_px(&survey, &out);
     assert!(px < 0.05, "{px}");
 }
@@ -278,7 +288,7 @@ fn joint_estimation_of_the_wall_improves_bricks() {
     let survey = dir.path().join("survey");
     simulate(
         &survey,
-        &["--frames", "16", "--size", "160x120", "--noise", "2"],
+        &["--frames", "12", "--size", "120x90", "--noise", "2"],
     );
     let refined = |name: &str, options: &[&str]| {
         let out = dir.path().join(name);
@@ -299,7 +309,7 @@ fn joint_estimation_of_the_wall_improves_bricks() {
 fn a_smooth_wall_is_refined_without_joint_estimation() {
     let dir = tempfile::tempdir().unwrap();
     let survey = dir.path().join("survey");
-    let concrete = ["--wall", "concrete", "--frames", "12", "--size", "240x180"];
+    let concrete = ["--wall", "concrete", "--frames", "12", "--size", "160x120"];
     simulate(&survey, &concrete);
     let refined = |name: &str, options: &[&str]| {
         let out = dir.path().join(name);

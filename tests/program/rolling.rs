@@ -16,9 +16,11 @@ fn simulate(out: &Path, size: &str, more: &[&str]) {
     support::simulate(out, &[&size[..], &speed, more].concat());
 }
 
-/// Refines a survey; returns the result of the rolling-shutter test and the warnings.
+/// Refines a survey with its wall as given; returns the result of the rolling-shutter test and the
+/// warnings.
 fn refine(survey: &Path, out: &Path) -> (Value, String) {
-    let output = tunnelstitch(&["refine", text(survey), "--out", text(out)]);
+    let refine = ["refine", text(survey), "--out", text(out)];
+    let output = tunnelstitch(&[&refine[..], &["--shape", "fixed"]].concat());
     let warned = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{warned}");
     let report = json(&out.join("refine.json"));
@@ -34,6 +36,8 @@ fn compare(survey: &Path, refined: &Path, out: &Path) -> Value {
         text(&poses),
         "--out",
         text(out),
+        "--px-per-metre",
+        "40",
         "--json",
     ]);
     serde_json::from_str(&printed).unwrap()
@@ -85,7 +89,7 @@ fn rows_may_be_read_bottom_up_and_each_frame_may_err_by_itself() {
     let (survey, out) = (path("survey"), path("out"));
     simulate(
         &survey,
-        "180x135",
+        "160x120",
         &[
             "--readout-ms",
             "-20",

@@ -1,14 +1,12 @@
 //! Frames from a video, through the program. Needs `ffmpeg` and `ffprobe`.
 
 use crate::support::missing::is_ffmpeg_missing;
-use crate::support::{blender_survey, edit, fail, simulate, succeed, text};
+use crate::support::{blender_survey, edit, fail, simulate, succeed, text, wall_px};
+use image::imageops::FilterType;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use tunnelstitch::evaluate::wall_error;
 use tunnelstitch::frames::Video;
-use tunnelstitch::survey::Survey;
-use tunnelstitch::trajectory::poses_of;
 
 /// Runs ffmpeg and returns its standard output.
 fn ffmpeg(arguments: &[&str]) -> Vec<u8> {
@@ -48,11 +46,10 @@ const ENTANGLED: [&str; 12] = [
     "open-gop=1:scenecut=0",
 ];
 
-/// Two turns of a brick tunnel in small frames.
-fn simulated(folder: &Path) -> PathBuf {
+/// So many small frames of a brick tunnel.
+fn simulated(folder: &Path, frames: &str) -> PathBuf {
     let out = folder.join("survey");
-    let options = ["--turns", "2", "--size", "192x144", "--supersample", "3"];
-    simulate(&out, &options);
+    simulate(&out, &["--frames", frames, "--size", "160x120"]);
     out
 }
 
@@ -80,6 +77,7 @@ fn every_picture_is_the_one_asked_for() {
         let from = blender_survey().join(format!("frames/{k:06}.jpg"));
         image::open(from)
             .unwrap()
+            .resize(160, 120, FilterType::Triangle)
             .to_luma8()
             .save(frame(k))
             .unwrap();
@@ -93,7 +91,7 @@ fn every_picture_is_the_one_asked_for() {
         let path = dir.path().join(name);
         video_of(&pattern, &path, codec);
         let video = Video::open(&path).unwrap();
-        assert_eq!((video.pictures(), video.size()), (24, (480, 360)));
+        assert_eq!((video.pictures(), video.size()), (24, (160, 120)));
         let grey = ["-f", "rawvideo", "-pix_fmt", "gray", "-"];
         let colour = [
             "-sws_flags",
@@ -136,16 +134,14 @@ fn every_picture_is_the_one_asked_for() {
     }
 }
 
-/// The refined poses and their error on the wall, pixels.
+/// The refined poses, with the wall as given, and their error on it, pixels.
 fn refined(survey: &Path) -> (String, f64) {
     let out = survey.join("refined");
-    succeed(&["refine", text(survey), "--out", text(&out), "--quiet"]);
+    let refine = ["refine", text(survey), "--out", text(&out), "--quiet"];
+    succeed(&[&refine[..], &["--shape", "fixed"]].concat());
     let poses = out.join("poses.tum");
-    let survey = Survey::open(survey).unwrap();
-    let found = poses_of(&survey.read_poses(&poses).unwrap());
-    let truth = poses_of(survey.truth.as_deref().unwrap());
-    let error = wall_error(survey.surface.as_ref(), &survey.cameras, &found, &truth).unwrap();
-    (std::fs::read_to_string(poses).unwrap(), error.px.rms)
+    let error_px = wall_px(survey, &poses);
+    (std::fs::read_to_string(poses).unwrap(), error_px)
 }
 
 #[test]
@@ -154,7 +150,7 @@ fn a_video_refines_as_its_pictures_do() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let survey = simulated(dir.path());
+    let survey = simulated(dir.path(), "14");
     let toml = survey.join("survey.toml");
     let pictures = std::fs::read_to_string(&toml).unwrap();
     let (expected, error_px) = refined(&survey);
@@ -187,7 +183,7 @@ fn every_command_takes_a_video() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let survey = simulated(dir.path());
+    let survey = simulated(dir.path(), "24");
     into_video(
         &survey,
         "survey.mp4",
@@ -198,7 +194,7 @@ fn every_command_takes_a_video() {
     let folder = text(&survey);
     let said = succeed(&["init", folder, "--radius-m", "3"]);
     assert!(
-        said.contains("survey.mp4 (24 pictures, 192 × 144 px)") && said.contains("next: "),
+        said.contains("survey.mp4 (24 pictures, 160 × 120 px)") && said.contains("next: "),
         "{said}"
     );
     let out = |name: &str| survey.join(name).to_str().unwrap().to_owned();
@@ -206,7 +202,7 @@ fn every_command_takes_a_video() {
     for arguments in [
         &["check", folder][..],
         &["config", folder],
-        &["refine", folder, "--out", &refined],
+        &["refine", folder, "--fast", "--out", &refined],
         &[
             "stitch",
             folder,
@@ -214,6 +210,8 @@ fn every_command_takes_a_video() {
             &poses,
             "--out",
             &out("after.png"),
+            "--px-per-metre",
+            "20",
         ],
         &[
             "compare",
@@ -222,6 +220,8 @@ fn every_command_takes_a_video() {
             &poses,
             "--out",
             &out("compared"),
+            "--px-per-metre",
+            "20",
         ],
         &[
             "report",
@@ -245,6 +245,7 @@ fn every_command_takes_a_video() {
             folder,
             "--out",
             &out("calibrated"),
+            "--fast",
             "--calibrate",
             "focal",
         ],
@@ -255,6 +256,8 @@ fn every_command_takes_a_video() {
             &out("calibrated/poses.tum"),
             "--out",
             &out("again.png"),
+            "--px-per-metre",
+            "20",
         ],
     ] {
         succeed(arguments);
@@ -333,7 +336,7 @@ fn what_is_wrong_with_a_video_is_said() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let survey = simulated(dir.path());
+    let survey = simulated(dir.path(), "24");
     let toml = survey.join("survey.toml");
     into_video(&survey, "a.mkv", &LOSSLESS);
     let sound = std::fs::read(survey.join("a.mkv")).unwrap();
@@ -404,7 +407,7 @@ fn lists_of_other_files_are_refused() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let survey = simulated(dir.path());
+    let survey = simulated(dir.path(), "3");
     into_video(&survey, "v.mkv", &LOSSLESS);
     let outside = dir.path().join("secret.mkv");
     std::fs::rename(survey.join("v.mkv"), &outside).unwrap();
@@ -443,7 +446,7 @@ fn folders_may_look_like_addresses() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let survey = simulated(dir.path());
+    let survey = simulated(dir.path(), "3");
     into_video(&survey, "v.mkv", &LOSSLESS);
     std::fs::create_dir(dir.path().join("http:")).unwrap();
     for name in ["http:/127.0.0.1:18999", "a:b", "-dash"] {

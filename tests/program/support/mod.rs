@@ -23,17 +23,12 @@ pub fn refined_blender_survey() -> &'static Path {
     static REFINED: OnceLock<tempfile::TempDir> = OnceLock::new();
     let refined = REFINED.get_or_init(|| {
         let dir = tempfile::tempdir().expect("a temporary folder");
-        refine_blender_survey(dir.path(), 2);
+        let survey = blender_survey();
+        let refine = ["refine", text(&survey), "--out", text(dir.path())];
+        succeed(&[&refine[..], &["--threads", "2", "--quiet"]].concat());
         dir
     });
     refined.path()
-}
-
-/// Refines [`blender_survey`] into a folder.
-pub fn refine_blender_survey(out: &Path, threads: usize) {
-    let (survey, threads) = (blender_survey(), threads.to_string());
-    let refine = ["refine", text(&survey), "--out", text(out), "--quiet"];
-    succeed(&[&refine[..], &["--threads", &threads]].concat());
 }
 
 /// A writable survey of the fixture's first `count` frames.
@@ -123,6 +118,20 @@ pub fn simulate(out: &Path, options: &[&str]) -> String {
         false => &["--supersample", "4"],
     };
     succeed(&[&start, points, options].concat())
+}
+
+/// Error on the wall of poses of a simulated survey, root mean square, pixels.
+pub fn wall_px(survey: &Path, poses: &Path) -> f64 {
+    let survey = tunnelstitch::survey::Survey::open(survey).expect("a survey");
+    let poses = tunnelstitch::trajectory::poses_of(&survey.read_poses(poses).expect("poses"));
+    let truth = survey.truth.as_deref().expect("true poses");
+    let error = tunnelstitch::evaluate::wall_error(
+        survey.surface.as_ref(),
+        &survey.cameras,
+        &poses,
+        &tunnelstitch::trajectory::poses_of(truth),
+    );
+    error.expect("poses that see the wall").px.rms
 }
 
 /// Content of a JSON file.
