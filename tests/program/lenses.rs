@@ -8,9 +8,9 @@ const PICTURE: &str = r#""width":320,"height":240,"cx":161.5,"cy":118.2"#;
 
 const SMALL_PICTURE: &str = r#""width":160,"height":120,"cx":80.5,"cy":58.9"#;
 
-/// Simulates frames seen by the camera of a file and refines their poses; returns the folder with
-/// `survey` and `refined`.
-fn refined(camera: &str, file: &str, frames: &str) -> TempDir {
+/// Simulates frames seen by the camera of a file and refines their poses with a mode of `--shape`;
+/// returns the folder with `survey` and `refined`.
+fn refined(camera: &str, file: &str, frames: &str, shape: &str) -> TempDir {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     let (survey, out) = (path("survey"), path("refined"));
@@ -22,13 +22,13 @@ fn refined(camera: &str, file: &str, frames: &str) -> TempDir {
     let given = tunnelstitch::camera::read_calibration(&file, None).unwrap();
     assert_eq!(own, given);
     let refine = ["refine", text(&survey), "--out", text(&out), "--quiet"];
-    succeed(&[&refine[..], &["--shape", "fixed"]].concat());
+    succeed(&[&refine[..], &["--shape", shape]].concat());
     dir
 }
 
 /// Refines two turns seen by the camera and returns `compare`'s report.
 fn repaired(camera: &str, file: &str) -> serde_json::Value {
-    let dir = refined(camera, file, "24");
+    let dir = refined(camera, file, "24", "auto");
     let path = |name: &str| dir.path().join(name);
     let (survey, poses) = (path("survey"), path("refined/poses.tum"));
     let report = succeed(&[
@@ -104,7 +104,7 @@ fn own_file((model, parameters, focal): (&str, &str, f64)) -> String {
 #[test]
 fn every_wide_angle_lens_is_repaired() {
     for model in MODELS {
-        let dir = refined(&own_file(model), "camera.json", "14");
+        let dir = refined(&own_file(model), "camera.json", "14", "fixed");
         let survey = dir.path().join("survey");
         let [before, after] = ["survey/baseline.tum", "refined/poses.tum"]
             .map(|poses| wall_px(&survey, &dir.path().join(poses)));

@@ -154,13 +154,12 @@ fn photometric_wall_px(survey: &Path, out: &Path) -> f64 {
     error.unwrap().px.rms
 }
 
-/// Simulates and refines with the wall as given; returns the folder with `survey` and `out`.
+/// Simulates and refines; returns the folder with `survey` and `out`.
 fn simulate_and_refine(options: &[&str]) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     simulate(&survey, options);
-    let refine = ["refine", text(&survey), "--out", text(&out), "--quiet"];
-    succeed(&[&refine[..], &["--shape", "fixed"]].concat());
+    succeed(&["refine", text(&survey), "--out", text(&out), "--quiet"]);
     dir
 }
 
@@ -268,14 +267,14 @@ fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
 /// with every pair of frames consistent.
 #[test]
 fn a_turn_closes_on_the_right_tile() {
-    let options = "--wall tiled-brick --frames 36 --size 240x180 --seed 2 --jitter random-walk \
+    let options = "--wall tiled-brick --frames 60 --size 320x240 --seed 2 --jitter random-walk \
                    --rotation-sigma-deg 2 --translation-sigma-m 0.02,0.02,0.03";
     let dir = simulate_and_refine(&options.split_whitespace().collect::<Vec<_>>());
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     let report = json(&out.join("refine.json"));
     let frames = report["frames"].as_array().unwrap();
     let believed = frames.iter().filter(|f| f["flag"] == "photometric");
-    assert_eq!(believed.count(), 36);
+    assert_eq!(believed.count(), 60);
     let px = photometric_wall_px(&survey, &out);
     assert!(px < 0.05, "{px}");
 }

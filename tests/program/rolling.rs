@@ -16,11 +16,9 @@ fn simulate(out: &Path, size: &str, more: &[&str]) {
     support::simulate(out, &[&size[..], &speed, more].concat());
 }
 
-/// Refines a survey with its wall as given; returns the result of the rolling-shutter test and the
-/// warnings.
+/// Refines a survey; returns the result of the rolling-shutter test and the warnings.
 fn refine(survey: &Path, out: &Path) -> (Value, String) {
-    let refine = ["refine", text(survey), "--out", text(out)];
-    let output = tunnelstitch(&[&refine[..], &["--shape", "fixed"]].concat());
+    let output = tunnelstitch(&["refine", text(survey), "--out", text(out)]);
     let warned = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{warned}");
     let report = json(&out.join("refine.json"));
