@@ -43,7 +43,8 @@ pub struct PlanJobArguments {
     )]
     cores: u16,
     /// Refine each section in N shards along the tunnel, tasks of their own that need less memory,
-    /// and join them. Poses differ by less than 0.05 σ from those without shards.
+    /// and join them. Poses differ by a fraction of their 1-σ from those without shards, as those
+    /// of a survey that begins elsewhere do.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     shards: Option<u32>,
     /// Refine each section in as many shards as it takes for no more than M frames of its own in each.

@@ -48,7 +48,9 @@ impl PatchScores {
 
     /// Gives back memory that is not used; scores are large for what they are.
     fn fit(&mut self) {
-        self.0.values_mut().for_each(|score| score.slots.shrink_to_fit());
+        self.0
+            .values_mut()
+            .for_each(|score| score.slots.shrink_to_fit());
     }
 
     /// Adds gradients to those of a patch.

@@ -163,3 +163,180 @@ fn in_survey(reason: RejectionReason, first: usize, motion: &GaugeMotion) -> Rej
         other => other,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::RefineInput;
+    use crate::options::RefineOptions;
+    use crate::shards::state::ShardEnd;
+    use crate::stages::begin::begin;
+    use crate::stages::state::{PipelineState, Snapshot};
+    use image::DynamicImage;
+    use std::sync::Arc;
+    use tunnelstitch_core::frames::{FrameSet, Light};
+    use tunnelstitch_geometry::camera::Camera;
+    use tunnelstitch_geometry::surface::Circle;
+    use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, StampedPose, spiral};
+
+    /// Frames of the survey.
+    const FRAMES: usize = 600;
+    /// Stretches that it is in.
+    const STRETCHES: usize = 3;
+
+    /// The true estimate of a frame.
+    fn truth(frame: usize) -> FrameEstimate {
+        FrameEstimate {
+            pose: spiral(frame + 1, 0.1, 0.5)[frame],
+            log_gain: 0.1 * (0.3 * frame as f64).sin(),
+            bias: 2.0 * (0.7 * frame as f64).cos(),
+        }
+    }
+
+    /// The difference of a stretch to the first one.
+    fn difference(number: usize) -> ShardAlignment {
+        let n = (number - 1) as f64;
+        ShardAlignment {
+            motion: GaugeMotion::about_y(0.7 * n, -1.3 * n),
+            log_gain: 0.05 * n,
+            bias: -3.0 * n,
+        }
+    }
+
+    /// The inverse of [`ShardAlignment::apply`].
+    fn without(alignment: &ShardAlignment, estimate: &FrameEstimate) -> FrameEstimate {
+        let log_gain = estimate.log_gain - alignment.log_gain;
+        FrameEstimate {
+            pose: alignment.motion.reversed().apply(&estimate.pose),
+            log_gain,
+            bias: estimate.bias - log_gain.exp() * alignment.bias,
+        }
+    }
+
+    /// Calls a function with a survey and its stretches, whose estimates and rejections are those
+    /// that `change` makes of the true ones by stretch and frame of the survey.
+    fn with_stretches<T>(
+        change: impl Fn(usize, usize, &mut FrameEstimate) -> Option<RejectionReason>,
+        function: impl FnOnce(&Setup, &[StraightShard]) -> T,
+    ) -> T {
+        let grey = DynamicImage::new_luma8(32, 24);
+        let frames = FrameSet::in_memory((0..FRAMES).map(|_| grey.clone()));
+        let initial = (0..FRAMES).map(|k| StampedPose {
+            time_s: k as f64,
+            pose: truth(k).pose,
+        });
+        let initial: Vec<StampedPose> = initial.collect();
+        let jitter = Jitter {
+            model: JitterModel::RandomWalk,
+            rotation_sigma_rad: 0.03,
+            translation_sigma_m: [0.02; 3],
+        };
+        let camera = Camera::from_vertical_fov(32, 24, 1.0);
+        let wall = Arc::new(Circle::new(3.0).unwrap());
+        let input = RefineInput::new(camera, wall, &frames, &initial, jitter);
+        let options = RefineOptions::default();
+        let setup = Setup::new(input, &options).unwrap();
+        let stretch = |number: usize| {
+            let shard = Shard::new(number, STRETCHES, FRAMES, 1).unwrap();
+            let of_frame = |frame: usize| {
+                let mut estimate = without(&difference(number), &truth(frame));
+                let rejection = change(number, frame, &mut estimate);
+                (estimate, rejection)
+            };
+            let (estimates, rejections) = shard.frames.clone().map(of_frame).unzip();
+            let state = PipelineState {
+                frames: FrameStates {
+                    estimates,
+                    rejections,
+                    kappa: Kappa::zeros(),
+                },
+                ..begin(&setup)
+            };
+            let snapshot = Snapshot {
+                state,
+                light: Light::Even,
+                hidden_bands: Vec::new(),
+                timings: Vec::new(),
+                elapsed_s: 0.0,
+            };
+            let end = ShardEnd {
+                snapshot: Box::new(snapshot),
+                bend_per_m: [0.0; 2],
+            };
+            StraightShard {
+                shard,
+                end: Some(end),
+            }
+        };
+        let stretches: Vec<StraightShard> = (1..=STRETCHES).map(stretch).collect();
+        function(&setup, &stretches)
+    }
+
+    #[test]
+    fn stretches_of_known_gauges_make_the_survey() {
+        let reason = |number: usize, frame: usize, _: &mut FrameEstimate| {
+            let is_repeated = frame == 431 && number == 3;
+            is_repeated.then_some(RejectionReason::Repeated(430 - (400 - 80)))
+        };
+        with_stretches(reason, |setup, stretches| {
+            let joined = join_frames(setup, stretches).unwrap();
+            assert_eq!(joined.states.estimates.len(), FRAMES);
+            for (k, found) in joined.states.estimates.iter().enumerate() {
+                let expected = truth(k);
+                assert!(found.pose.local(&expected.pose).norm() < 1e-9, "{k}");
+                assert!((found.log_gain - expected.log_gain).abs() < 1e-9, "{k}");
+                assert!((found.bias - expected.bias).abs() < 1e-9, "{k}");
+            }
+            let rejected = &joined.states.rejections;
+            assert_eq!(rejected[431], Some(RejectionReason::Repeated(430)));
+            assert_eq!(rejected.iter().flatten().count(), 1);
+            assert!(joined.displaced.is_empty());
+            for (k, alignment) in joined.alignments.iter().enumerate() {
+                let off = alignment.motion.plus(-1.0, &difference(k + 1).motion);
+                assert!(off.turn_rad.abs() < 1e-9 && off.shift_m.abs() < 1e-9);
+            }
+        });
+    }
+
+    #[test]
+    fn frames_that_stretches_place_apart_are_named_and_too_many_are_an_error() {
+        // Pixels are 15 cm wide.
+        let displaced = |from: usize| {
+            move |number: usize, frame: usize, estimate: &mut FrameEstimate| {
+                if number == 2 && (from..215).contains(&frame) {
+                    estimate.pose.t_wc.y += 0.4 * if frame.is_multiple_of(2) { 1.0 } else { -1.0 };
+                }
+                None
+            }
+        };
+        with_stretches(displaced(211), |setup, stretches| {
+            let joined = join_frames(setup, stretches).unwrap();
+            let frames: Vec<usize> = joined.displaced.iter().map(|(k, _)| *k).collect();
+            assert_eq!(frames, [211, 212, 213, 214]);
+        });
+        with_stretches(displaced(120), |setup, stretches| {
+            let Err(error) = join_frames(setup, stretches).map(|_| ()) else {
+                panic!("joined");
+            };
+            let message = error.to_string();
+            assert!(
+                message.contains("shards 1 and 2 place frames 160 to 239"),
+                "{message}"
+            );
+        });
+    }
+
+    #[test]
+    fn without_common_frames_the_initial_step_leads_on() {
+        let dark = |_: usize, frame: usize, _: &mut FrameEstimate| {
+            (150..250)
+                .contains(&frame)
+                .then_some(RejectionReason::Featureless)
+        };
+        with_stretches(dark, |setup, stretches| {
+            let joined = join_frames(setup, stretches).unwrap();
+            let pose = joined.states.estimates[FRAMES - 1].pose;
+            assert!(pose.local(&truth(FRAMES - 1).pose).norm() < 1e-9);
+        });
+    }
+}

@@ -9,7 +9,7 @@ pub enum JoinedLight {
     /// As it is.
     Even,
     /// Divided by the mean of the lights that stretches have found.
-    Shaded(LightModel),
+    Shaded(Box<LightModel>),
     /// Taken off by local normalisation.
     Normalised,
 }
@@ -53,7 +53,7 @@ pub fn join_light(lights: &[&Light]) -> Result<JoinedLight, RefineError> {
         Shading::none(size).changed(&mean)
     };
     let with_lamp = of_cameras.iter().filter(|light| light.lamp.is_some());
-    Ok(JoinedLight::Shaded(match lamps.first() {
+    Ok(JoinedLight::Shaded(Box::new(match lamps.first() {
         Some(lamp) => {
             let shadings: Vec<&Shading> = with_lamp.map(|light| &light.shading).collect();
             let count = lamps.len() as f64;
@@ -71,7 +71,7 @@ pub fn join_light(lights: &[&Light]) -> Result<JoinedLight, RefineError> {
                 lamp: None,
             }
         }
-    }))
+    })))
 }
 
 #[cfg(test)]

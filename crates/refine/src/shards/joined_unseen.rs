@@ -171,7 +171,7 @@ mod tests {
             let draw = UnseenError {
                 frames: shard.frames.clone().map(of_frame).collect(),
                 shared: Kappa::zeros(),
-                displacement: RadialField::new(lattice, 0, vec![0.001; 80]),
+                displacement: RadialField::new(lattice, -10, vec![0.001; 8 * 40]),
             };
             UnseenErrors {
                 draws: vec![draw; UNSEEN_DRAWS],
