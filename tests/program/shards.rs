@@ -85,10 +85,13 @@ fn a_job_of_shards_has_the_same_bytes_in_any_order_and_the_poses_of_a_single_run
     for task in ["s.refine-2", "s.refine-1", "s.refine", "s.stitch"] {
         succeed(&["run-task", text(&back), task]);
     }
-    assert_eq!(
-        outputs(&forth.join("s/refined")),
-        outputs(&back.join("s/refined"))
-    );
+    // survey.toml names the frames as the folder of the job sees them.
+    let results = |job: &Path| {
+        let mut files = outputs(&job.join("s/refined"));
+        files.remove(Path::new("survey.toml"));
+        files
+    };
+    assert_eq!(results(&forth), results(&back));
     let panorama = |job: &Path| std::fs::read(job.join("s/panorama.tif")).unwrap();
     assert_eq!(panorama(&forth), panorama(&back));
     assert_near(&dir.path().join("plain"), &forth.join("s/refined"));

@@ -221,7 +221,13 @@ fn joined_wall(
             by,
             own_h_m,
         };
-        Some((WallStretch { shape, by, own_h_m }, unseen))
+        let wall = WallStretch {
+            shape,
+            by,
+            own_h_m,
+            own_share: shard.own.len() as f64 / shard.frames.len() as f64,
+        };
+        Some((wall, unseen))
     });
     let (shapes, unseen): (Vec<WallStretch>, Vec<UnseenStretch>) = of_wall.unzip();
     if shapes.is_empty() {

@@ -20,6 +20,8 @@ pub struct WallStretch<'s> {
     pub by: WallPoint,
     /// Chainage between which it is the stretch's own, in the gauge of all, metres.
     pub own_h_m: [f64; 2],
+    /// Share of its frames that are its own.
+    pub own_share: f64,
 }
 
 /// The stretch to which a chainage (metres) is nearest, by the chainages that are their own.
@@ -58,10 +60,13 @@ pub fn join_shapes(empty: ShapeModel, stretches: &[WallStretch], origin: WallPoi
         .into_iter()
         .filter(|kind| !seen.contains(kind))
     {
-        let limits = stretches.iter().flat_map(|s| s.shape.model.dropped.iter());
-        let limits = limits.filter(|scale| columns_of(scale) == kind);
         // The evidence of all falls by the sum of what it falls by in each, as the fourth power.
-        let sum: f64 = limits.map(|scale| scale.sigma_m.powi(-4)).sum();
+        let falls = stretches.iter().flat_map(|stretch| {
+            let limits = stretch.shape.model.dropped.iter();
+            let limits = limits.filter(|scale| columns_of(scale) == kind);
+            limits.map(|scale| stretch.own_share * scale.sigma_m.powi(-4))
+        });
+        let sum: f64 = falls.sum();
         let functions = functions_of(&model, kind);
         model.dropped.push(Scale {
             functions,
@@ -240,11 +245,13 @@ mod tests {
                 shape: &first,
                 by: WallPoint::default(),
                 own_h_m: [0.0, 10.0],
+                own_share: 1.0,
             },
             WallStretch {
                 shape: &second,
                 by,
                 own_h_m: [10.1, 20.0],
+                own_share: 1.0,
             },
         ];
         let joined = join_shapes(model([-1.0, 21.0]), &stretches, WallPoint::default());
@@ -274,6 +281,7 @@ mod tests {
             shape: &unseen,
             by: WallPoint::default(),
             own_h_m,
+            own_share: 1.0,
         };
         let stretches = [stretch([0.0, 4.0]), stretch([4.0, 8.0])];
         let joined = join_shapes(model([0.0, 9.0]), &stretches, WallPoint::default());

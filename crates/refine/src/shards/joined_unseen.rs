@@ -3,8 +3,9 @@
 //!
 //! Draws of different stretches are independent: each deforms its own wall. Along the gauge the
 //! errors of a stretch are counted from its first frame. In the tunnel of all they go on where
-//! those of the stretch before have come to. The strengths that the pixels of n like stretches
-//! admit are those of one times `n^(−1/4)`, as the evidence falls with their fourth power.
+//! those of the stretch before have come to. The strengths that the pixels of all frames admit are
+//! those of a stretch with the share x of them times `x^(1/4)`, as the evidence falls with the number
+//! of frames and with the fourth power of the strength.
 
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
@@ -30,6 +31,13 @@ pub struct UnseenStretch<'s> {
     pub own_h_m: [f64; 2],
 }
 
+impl UnseenStretch<'_> {
+    /// Strength that the pixels of all of so many frames admit over that of the stretch.
+    fn scale(&self, frames: usize) -> f64 {
+        (self.shard.frames.len() as f64 / frames as f64).powf(0.25)
+    }
+}
+
 /// Joins the errors of stretches. `estimates`: of all frames, in the gauge of all; `lattice`: its
 /// origin and perimeter are those of the wall; `extent_h_m`: of the wall, metres.
 pub fn join_unseen(
@@ -48,19 +56,21 @@ pub fn join_unseen(
     };
     let lattice = SplineLattice { columns, ..lattice };
     let rows = lattice.rows_between(extent_h_m[0], extent_h_m[1]);
-    let scale = (stretches.len() as f64).powf(-0.25);
     let joined = (0..UNSEEN_DRAWS).par_map(|draw| UnseenError {
-        frames: frames_of(stretches, draw, estimates, gauge, scale),
-        shared: shared_of(stretches, draw) * scale,
-        displacement: displacement_of(stretches, draw, (lattice, rows.clone()), scale),
+        frames: frames_of(stretches, draw, estimates, gauge),
+        shared: shared_of(stretches, draw, estimates.len()),
+        displacement: displacement_of(stretches, draw, (lattice, rows.clone()), estimates.len()),
     });
     UnseenErrors { draws: joined }
 }
 
 /// The mean error of the shared parameters of a draw.
-fn shared_of(stretches: &[UnseenStretch], draw: usize) -> Kappa {
-    let errors = stretches.iter().filter_map(|s| s.errors.draws.get(draw));
-    errors.map(|error| error.shared).sum::<Kappa>() / stretches.len() as f64
+fn shared_of(stretches: &[UnseenStretch], draw: usize, frames: usize) -> Kappa {
+    let errors = stretches.iter().filter_map(|stretch| {
+        let error = stretch.errors.draws.get(draw)?;
+        Some(error.shared * stretch.scale(frames))
+    });
+    errors.sum::<Kappa>() / stretches.len() as f64
 }
 
 /// The errors of all frames of a draw.
@@ -69,7 +79,6 @@ fn frames_of(
     draw: usize,
     estimates: &[FrameEstimate],
     gauge: &Gauge,
-    scale: f64,
 ) -> Vec<FrameStep> {
     let mut errors: Vec<FrameStep> = Vec::with_capacity(estimates.len());
     // The amounts of the gauge's directions that errors have come to, and the error there of the
@@ -77,7 +86,7 @@ fn frames_of(
     let mut amounts = DVector::zeros(gauge.degrees_of_freedom());
     let mut before: Option<FrameStep> = None;
     for stretch in stretches {
-        let shard = stretch.shard;
+        let (shard, scale) = (stretch.shard, stretch.scale(estimates.len()));
         let error = |frame: usize| {
             let draw = stretch.errors.draws.get(draw);
             let step = draw.and_then(|draw| draw.frames.get(shard.place(frame)));
@@ -132,17 +141,18 @@ fn displacement_of(
     stretches: &[UnseenStretch],
     draw: usize,
     (lattice, rows): (SplineLattice, Range<i64>),
-    scale: f64,
+    frames: usize,
 ) -> RadialField {
     let fields = stretches.iter().map(|stretch| {
         let error = stretch.errors.draws.get(draw)?;
-        Some(error.displacement.clone().moved(stretch.by))
+        let field = error.displacement.clone().moved(stretch.by);
+        Some((field, stretch.scale(frames)))
     });
-    let fields: Vec<Option<RadialField>> = fields.collect();
+    let fields: Vec<Option<(RadialField, f64)>> = fields.collect();
     RadialField::through(lattice, rows, |wall| {
         let own_h_m = stretches.iter().map(|stretch| stretch.own_h_m);
         let field = fields[nearest(own_h_m, wall.h_m)].as_ref();
-        field.map_or(0.0, |field| scale * field.at(wall).delta_m)
+        field.map_or(0.0, |(field, scale)| scale * field.at(wall).delta_m)
     })
 }
 
@@ -187,7 +197,8 @@ mod tests {
         let stretches = [stretch(0), stretch(1)];
         let joined = join_unseen(&stretches, &estimates, &gauge, lattice, [-1.0, 41.0]);
         assert_eq!(joined.draws.len(), UNSEEN_DRAWS);
-        let scale = 2f64.powf(-0.25);
+        // With 80 frames of the other one.
+        let scale = (280.0f64 / 400.0).powf(0.25);
         for frame in [0, 199, 200, 399] {
             let found = along(&gauge, &estimates[frame], &joined.draws[3].frames[frame]);
             assert!(
