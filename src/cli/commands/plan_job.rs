@@ -47,7 +47,8 @@ pub struct PlanJobArguments {
     /// of a survey that begins elsewhere do.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     shards: Option<u32>,
-    /// Refine each section in as many shards as it takes for no more than M frames of its own in each.
+    /// Refine each section in as many shards as it takes for no more than M frames of its own in
+    /// each.
     #[arg(
         long,
         value_name = "M",

@@ -4,8 +4,8 @@
 //! Draws of different stretches are independent: each deforms its own wall. Along the gauge the
 //! errors of a stretch are counted from its first frame. In the tunnel of all they go on where
 //! those of the stretch before have come to. The strengths that the pixels of all frames admit are
-//! those of a stretch with the share x of them times `x^(1/4)`, as the evidence falls with the number
-//! of frames and with the fourth power of the strength.
+//! those of a stretch with the share x of them times `x^(1/4)`, as the evidence falls with the
+//! number of frames and with the fourth power of the strength.
 
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
