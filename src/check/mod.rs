@@ -27,7 +27,10 @@ mod unused_bits;
 mod warnings;
 
 pub use deformation::DeformationCheck;
-pub use effort::{Effort, refine_bytes, refine_processor_s, refine_s};
+pub use effort::{
+    Effort, JOIN_SHARE, join_bytes, refine_bytes, refine_processor_s, refine_s, shard_bytes,
+    shard_share,
+};
 pub use interlacing::interlacing_warning;
 pub use jitter::JitterCheck;
 pub use masks::MaskCheck;

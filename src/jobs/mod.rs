@@ -33,7 +33,7 @@ mod text_file;
 pub use error::JobError;
 pub use job::{JOB_FILE, Job, Needs, Step, Task};
 pub use network::{Network, Section};
-pub use plan::{PlanOptions, plan};
+pub use plan::{Division, PlanOptions, plan};
 pub use process::end_processes;
 pub use run_job::{JobSummary, TaskEnd, TaskOutcome, run_job};
 pub use run_task::{DoneTask, read_records, run_task};

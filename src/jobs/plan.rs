@@ -3,7 +3,7 @@
 use super::error::JobError;
 use super::job::{Job, Needs, Step, Task};
 use super::network::{Network, Section};
-use crate::check::{Effort, refine_processor_s};
+use crate::check::{Effort, JOIN_SHARE, join_bytes, refine_processor_s, shard_bytes, shard_share};
 use crate::files::printed;
 use crate::refine::RefineOptions;
 use crate::render::native_px_per_metre;
@@ -36,6 +36,29 @@ pub struct PlanOptions {
     pub steps: BTreeSet<Step>,
     /// Processors of a task.
     pub cores: u16,
+    /// Shards in which each section is refined.
+    pub division: Division,
+}
+
+/// Shards in which a section is refined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Division {
+    /// So many, or fewer if it has not as many frames.
+    Shards(usize),
+    /// As many as it takes for so many frames of its own in each.
+    FramesPerShard(usize),
+}
+
+impl Division {
+    /// Number of shards of a survey.
+    fn shards(self, survey: &Survey) -> usize {
+        let moments = survey.frames.len() / survey.cameras.count().max(1);
+        let shards = match self {
+            Self::Shards(shards) => shards,
+            Self::FramesPerShard(frames) => survey.frames.len().div_ceil(frames.max(1)),
+        };
+        shards.clamp(1, moments.max(1))
+    }
 }
 
 /// Plans the tasks of a network for a job in `folder`.
@@ -63,31 +86,50 @@ fn section_tasks(
         source,
     })?;
     let inputs = inputs_of(&survey, folder)?;
-    let work = Work::of(&survey);
+    let work = Work::of(&survey, options.division.shards(&survey));
     let is_refined = options.steps.contains(&Step::Refine);
     let call = Call {
         id: &section.id,
         survey: from_folder(&section.survey, folder)?,
         is_refined,
+        shards: work.shards,
+    };
+    let task = |id: String, step: Step, (command, output): (Vec<String>, String)| Task {
+        id,
+        section: section.id.clone(),
+        step,
+        command,
+        inputs: inputs.clone(),
+        outputs: vec![output.into()],
+        after: Vec::new(),
+        needs: work.needs(step, options.cores),
     };
     let refine = format!("{}.{}", section.id, Step::Refine);
-    let tasks = options.steps.iter().map(|step| {
-        let (command, output) = call.command_and_output(*step);
-        Task {
-            id: format!("{}.{step}", section.id),
-            section: section.id.clone(),
-            step: *step,
-            command,
-            inputs: inputs.clone(),
-            outputs: vec![output.into()],
-            after: match is_refined && *step != Step::Refine {
-                true => vec![refine.clone()],
-                false => Vec::new(),
-            },
-            needs: work.needs(*step, options.cores),
-        }
-    });
-    Ok(tasks.collect())
+    let mut tasks = Vec::new();
+    if is_refined && work.shards > 1 {
+        tasks.extend((1..=work.shards).map(|number| Task {
+            needs: work.needs_of_shard(options.cores),
+            ..task(
+                format!("{refine}-{number}"),
+                Step::Refine,
+                call.shard(number),
+            )
+        }));
+    }
+    let shards: Vec<String> = tasks.iter().map(|task| task.id.clone()).collect();
+    tasks.extend(options.steps.iter().map(|step| Task {
+        after: match step {
+            Step::Refine => shards.clone(),
+            _ if is_refined => vec![refine.clone()],
+            _ => Vec::new(),
+        },
+        ..task(
+            format!("{}.{step}", section.id),
+            *step,
+            call.command_and_output(*step),
+        )
+    }));
+    Ok(tasks)
 }
 
 /// The commands of a section.
@@ -98,6 +140,8 @@ struct Call<'s> {
     survey: PathBuf,
     /// True if its poses are refined.
     is_refined: bool,
+    /// Shards in which they are.
+    shards: usize,
 }
 
 impl Call<'_> {
@@ -111,8 +155,13 @@ impl Call<'_> {
             true => vec!["--poses", poses.as_str()],
             false => Vec::new(),
         };
+        let shards = self.shards_folder();
+        let joined = match self.shards {
+            1 => Vec::new(),
+            _ => vec!["--join", shards.as_str()],
+        };
         let (options, flag, output) = match step {
-            Step::Refine => (Vec::new(), "--out", refined.clone()),
+            Step::Refine => (joined, "--out", refined.clone()),
             Step::Stitch => (with_poses, "--out", format!("{id}/panorama.tif")),
             Step::Report => (
                 vec!["--refined", refined.as_str()],
@@ -121,28 +170,56 @@ impl Call<'_> {
             ),
             Step::Export => (with_poses, "--3dtiles", format!("{id}/tiles")),
         };
-        let name = step.to_string();
-        let words = ["tunnelstitch", name.as_str(), survey.as_ref()];
-        let words = words
-            .into_iter()
-            .chain(options)
-            .chain([flag, output.as_str()]);
-        (words.map(str::to_owned).collect(), output)
+        let words = options.into_iter().chain([flag, output.as_str()]);
+        (command(step, &survey, words), output)
     }
+
+    /// The command of a shard of the refinement, and its output.
+    fn shard(&self, number: usize) -> (Vec<String>, String) {
+        let (folder, of) = (self.shards_folder(), self.shards);
+        let shard = format!("{number}/{of}");
+        let words = ["--shard", shard.as_str(), "--out", folder.as_str()];
+        let survey = self.survey.to_string_lossy();
+        let output = format!("{folder}/shard-{number}-of-{of}.state");
+        (command(Step::Refine, &survey, words), output)
+    }
+
+    /// Folder of the shards, from that of the job.
+    fn shards_folder(&self) -> String {
+        format!("{}/shards", self.id)
+    }
+}
+
+/// A command on a survey.
+fn command<'w>(
+    step: Step,
+    survey: &'w str,
+    words: impl IntoIterator<Item = &'w str>,
+) -> Vec<String> {
+    let name = step.to_string();
+    let first = ["tunnelstitch", name.as_str(), survey];
+    let all = first.into_iter().map(str::to_owned);
+    all.chain(words.into_iter().map(str::to_owned)).collect()
 }
 
 /// The work of a section.
 struct Work {
     /// Processor time of refining, seconds.
     refine_s: f64,
-    /// Memory of refining, bytes.
+    /// Memory of refining, or of joining shards, bytes.
     refine_bytes: u64,
+    /// Number of shards.
+    shards: usize,
+    /// Share of the processor time of refining that a shard takes, and one that joins them.
+    shares: [f64; 2],
+    /// Memory of refining a shard, bytes.
+    shard_bytes: u64,
     /// Pixels of the panorama at the frames' resolution.
     panorama_px: f64,
 }
 
 impl Work {
-    fn of(survey: &Survey) -> Self {
+    fn of(survey: &Survey, shards: usize) -> Self {
         let surface = survey.surface.as_ref();
         // Cameras that show no wall make no panorama: refining says so.
         let px_per_metre = native_px_per_metre(surface, &survey.cameras, &survey.initial_poses());
@@ -150,7 +227,16 @@ impl Work {
         let [width, height] = effort.panorama_px;
         Self {
             refine_s: refine_processor_s(survey, &RefineOptions::default()),
-            refine_bytes: effort.refine_bytes,
+            refine_bytes: match shards {
+                1 => effort.refine_bytes,
+                _ => join_bytes(survey),
+            },
+            shards,
+            shares: match shards {
+                1 => [0.0, 1.0],
+                _ => [shard_share(survey, shards), JOIN_SHARE],
+            },
+            shard_bytes: shard_bytes(survey, shards),
             panorama_px: width as f64 * height as f64,
         }
     }
@@ -158,17 +244,26 @@ impl Work {
     fn needs(&self, step: Step, cores: u16) -> Needs {
         let panorama_s = TIME_PER_PANORAMA_PIXEL_S * self.panorama_px;
         let (processor_s, bytes) = match step {
-            Step::Refine => (self.refine_s, self.refine_bytes),
+            Step::Refine => (self.shares[1] * self.refine_s, self.refine_bytes),
             Step::Stitch | Step::Export => (panorama_s, PANORAMA_BYTES),
             Step::Report => (PANORAMAS_OF_REPORT * panorama_s, PANORAMA_BYTES),
         };
-        let seconds = START_S + processor_s / f64::from(cores);
-        Needs {
-            cores,
-            memory_bytes: PROGRAM_BYTES + bytes,
-            seconds,
-            limit_seconds: (LIMIT_FACTOR * seconds).max(MIN_LIMIT_S),
-        }
+        needs(processor_s, bytes, cores)
+    }
+
+    fn needs_of_shard(&self, cores: u16) -> Needs {
+        needs(self.shares[0] * self.refine_s, self.shard_bytes, cores)
+    }
+}
+
+/// Needs of a task of this processor time (seconds), and this memory beside that of the program.
+fn needs(processor_s: f64, bytes: u64, cores: u16) -> Needs {
+    let seconds = START_S + processor_s / f64::from(cores);
+    Needs {
+        cores,
+        memory_bytes: PROGRAM_BYTES + bytes,
+        seconds,
+        limit_seconds: (LIMIT_FACTOR * seconds).max(MIN_LIMIT_S),
     }
 }
 
@@ -253,6 +348,7 @@ mod tests {
         PlanOptions {
             steps: steps.iter().copied().collect(),
             cores: 2,
+            division: Division::Shards(1),
         }
     }
 
@@ -283,6 +379,39 @@ mod tests {
         assert_eq!(export.after, ["K1.refine"]);
         job.write(&folder).unwrap();
         assert_eq!(Job::read(&folder).unwrap(), job);
+    }
+
+    #[test]
+    fn shards_come_before_what_joins_them() {
+        let dir = tempfile::tempdir().unwrap();
+        let network = Network {
+            sections: vec![survey(&dir.path().join("K1"))],
+        };
+        let plan = |division: Division| {
+            let options = PlanOptions {
+                division,
+                ..options(&[Step::Refine, Step::Stitch])
+            };
+            plan(&network, &dir.path().join("job"), &options).unwrap()
+        };
+        let job = plan(Division::FramesPerShard(1));
+        let [first, second, join, stitch] = &job.tasks[..] else {
+            panic!("{job:?}");
+        };
+        assert_eq!(
+            second.command.join(" "),
+            "tunnelstitch refine ../K1 --shard 2/2 --out K1/shards"
+        );
+        assert_eq!(second.outputs, [Path::new("K1/shards/shard-2-of-2.state")]);
+        assert_eq!(
+            join.command.join(" "),
+            "tunnelstitch refine ../K1 --join K1/shards --out K1/refined"
+        );
+        assert_eq!(join.after, [first.id.as_str(), second.id.as_str()]);
+        assert_eq!(stitch.after, ["K1.refine"]);
+        // No more shards than frames, and one is none.
+        assert_eq!(plan(Division::Shards(9)), job);
+        assert_eq!(plan(Division::FramesPerShard(2)).tasks.len(), 2);
     }
 
     #[test]

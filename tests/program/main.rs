@@ -43,6 +43,7 @@ mod resume;
 mod rig;
 mod rolling;
 mod shapes;
+mod shards;
 mod shifted_poses;
 mod simulate;
 mod simulated_walls;

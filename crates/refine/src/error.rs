@@ -31,6 +31,57 @@ pub enum RefineError {
         /// Number of initial poses.
         poses: usize,
     },
+    /// A stretch that there is not.
+    #[error(
+        "there is no shard {number} of {of} of a survey of {frames} frames; they are counted from \
+         1, and each needs a frame of every camera"
+    )]
+    NoShard {
+        /// The number asked for.
+        number: usize,
+        /// Number of stretches.
+        of: usize,
+        /// Number of frames.
+        frames: usize,
+    },
+    /// Stretches that do not make up the survey.
+    #[error(
+        "the shards to be joined are not all of the survey, each once, in order: {what}; refine \
+         every shard of the same number of shards"
+    )]
+    ShardsIncomplete {
+        /// The difference.
+        what: String,
+    },
+    /// Neighbouring stretches that contradict each other.
+    #[error(
+        "shards {number} and {} place frames {first} to {last}, which they share, {distance_px:.1} \
+         px apart, so one of them is wrong; divide the survey elsewhere (another number of \
+         shards), or refine it as one",
+        number + 1
+    )]
+    ShardsDisagree {
+        /// The first of the two, from 1.
+        number: usize,
+        /// First frame that both have placed.
+        first: usize,
+        /// Last frame that both have placed.
+        last: usize,
+        /// Median distance of their places, pixels.
+        distance_px: f64,
+    },
+    /// Stretches of different light.
+    #[error(
+        "the light fits no model in {normalised} of {of} shards, and does in the others; give \
+         photometry = \"normalised\" under [options.refine] of survey.toml, and refine the shards \
+         anew"
+    )]
+    LightOfShards {
+        /// Number of stretches without a model.
+        normalised: usize,
+        /// Number of stretches.
+        of: usize,
+    },
     /// Nothing overlaps.
     #[error(
         "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m \

@@ -70,6 +70,7 @@ mod reading_search;
 mod refined;
 mod report;
 mod samples;
+mod shards;
 mod solver;
 mod stages;
 #[cfg(test)]
@@ -97,6 +98,10 @@ pub use refined::Refined;
 pub use report::{
     FrameFlag, FrameReport, HiddenBand, LevelReport, PoseReport, RefineReport, StageTime,
 };
+pub use shards::division::{SHARD_CACHE_BYTES, Shard};
+pub use shards::join_shards::join_shards;
+pub use shards::refine_shard::refine_shard;
+pub use shards::state::ShardState;
 pub use solver::solve_record::{SolveRecord, StepRecord};
 pub use solver::stopping::StopReason;
 pub use tracking::focal_search::focal_search_registrations;

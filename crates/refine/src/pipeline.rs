@@ -13,10 +13,11 @@ use crate::options::{Photometry, RefineOptions};
 use crate::refined::Refined;
 use crate::stages::assess::without_solution;
 use crate::stages::begin::begin;
+use crate::stages::plan::Stage;
 use crate::stages::run::run_stage;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
-use crate::stages::state::{Estimation, PipelineState};
+use crate::stages::state::{Estimation, PipelineState, Snapshot};
 use std::sync::Arc;
 use tunnelstitch_core::frames::Light;
 use tunnelstitch_core::persist::checkpoint::Checkpoint;
@@ -62,9 +63,52 @@ pub fn refine_with_checkpoint<'a>(
     checkpoint: Option<&mut Checkpoint>,
     progress: &Arc<dyn Progress>,
 ) -> Result<Refined, RefineError> {
-    let input = input.into();
     let mut session = Session::new(checkpoint, progress);
-    let mut snapshot = session.snapshot()?;
+    let snapshot = session.snapshot()?;
+    refine_from(&input.into(), options, snapshot, &mut session)
+}
+
+/// Refines the poses of frames from a snapshot, or from the beginning.
+///
+/// # Errors
+/// [`RefineError`].
+pub fn refine_from(
+    input: &RefineInput,
+    options: &RefineOptions,
+    mut snapshot: Option<Snapshot>,
+    session: &mut Session,
+) -> Result<Refined, RefineError> {
+    loop {
+        match run(input, options, snapshot.take(), |_| false, session)? {
+            Pause::Refined(refined) => {
+                session.progress.leave_job();
+                return Ok(*refined);
+            }
+            Pause::Before(paused) => snapshot = Some(*paused),
+        }
+    }
+}
+
+/// The place where a run through the stages pauses.
+pub enum Pause {
+    /// At its end, with the result.
+    Refined(Box<Refined>),
+    /// Before a stage.
+    Before(Box<Snapshot>),
+}
+
+/// Runs the stages from a snapshot, or from the beginning, as far as the first one that
+/// `is_beyond` names.
+///
+/// # Errors
+/// [`RefineError`].
+pub fn run(
+    input: &RefineInput,
+    options: &RefineOptions,
+    mut snapshot: Option<Snapshot>,
+    is_beyond: impl Fn(&Stage) -> bool,
+    session: &mut Session,
+) -> Result<Pause, RefineError> {
     let known = snapshot.as_ref().map(|snapshot| &snapshot.hidden_bands);
     let mut hidden_bands = known.cloned().unwrap_or_default();
     loop {
@@ -84,11 +128,8 @@ pub fn refine_with_checkpoint<'a>(
             Some(snapshot) => session.restore(&setup, snapshot),
             None => begin(&setup),
         };
-        match run_stages(&setup, state, &mut session)? {
-            Outcome::Refined(refined) => {
-                progress.leave_job();
-                return Ok(*refined);
-            }
+        match run_stages(&setup, state, &is_beyond, session)? {
+            Outcome::Paused(pause) => return Ok(pause),
             Outcome::Hidden(bands) => hidden_bands = bands,
         }
     }
@@ -96,17 +137,18 @@ pub fn refine_with_checkpoint<'a>(
 
 /// The end of a run through the stages.
 enum Outcome {
-    /// The result.
-    Refined(Box<Refined>),
+    /// The result, or the stage before which it pauses.
+    Paused(Pause),
     /// The bands along the tunnel without which all is to be done again: angles θ from and to,
     /// radians.
     Hidden(Vec<[f64; 2]>),
 }
 
-/// Runs the stages that are left.
+/// Runs the stages that are left, as far as the first one that `is_beyond` names.
 fn run_stages(
     setup: &Setup,
     state: PipelineState,
+    is_beyond: &dyn Fn(&Stage) -> bool,
     session: &mut Session,
 ) -> Result<Outcome, RefineError> {
     if setup.options.photometry == Photometry::Normalised {
@@ -114,6 +156,10 @@ fn run_stages(
     }
     let mut estimation = Estimation::new(state);
     while let Some(stage) = estimation.state.stages.front().copied() {
+        if is_beyond(&stage) {
+            let paused = session.snapshot_of(setup, estimation.state);
+            return Ok(Outcome::Paused(Pause::Before(Box::new(paused))));
+        }
         // The solution that the assessment uses is no part of a snapshot.
         if estimation.solution.is_none() {
             session.keep_if_due(setup, || estimation.state.clone())?;
@@ -158,7 +204,13 @@ fn run_stages(
         };
     }
     let refined = estimation.refined.ok_or(RefineError::NoOverlap)?;
-    Ok(Outcome::Refined(Box::new(refined)))
+    Ok(Outcome::refined(refined))
+}
+
+impl Outcome {
+    fn refined(refined: Refined) -> Self {
+        Self::Paused(Pause::Refined(Box::new(refined)))
+    }
 }
 
 /// True if local normalisation may take the place of a model of light that does not hold.
@@ -189,6 +241,5 @@ fn unsolved(
     reason: &RejectionReason,
     rejections: Vec<Option<RejectionReason>>,
 ) -> Outcome {
-    let refined = without_solution(setup, session, reason, rejections);
-    Outcome::Refined(Box::new(refined))
+    Outcome::refined(without_solution(setup, session, reason, rejections))
 }

@@ -91,8 +91,15 @@ pub fn run(
     check_outputs(&survey, out)?;
     let overlay = leave_out_overlay(&mut survey, terminal)?;
     let options = RefineOptions::default();
-    let (refined, _, outputs) =
-        stage_refined(&survey, &overlay, &options, out, record, None, terminal)?;
+    let (refined, _, outputs) = stage_refined(
+        &survey,
+        &overlay,
+        &options,
+        out,
+        record,
+        (None, None),
+        terminal,
+    )?;
     outputs.commit()?;
     if !terminal.is_json() {
         print_summary(&refined.report, false, terminal);

@@ -19,6 +19,7 @@ pub mod project;
 pub mod refine;
 pub mod refine_files;
 pub mod refine_memory;
+pub mod refine_shards;
 pub mod refine_summary;
 pub mod report;
 pub mod run_job;

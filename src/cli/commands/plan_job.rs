@@ -2,7 +2,7 @@
 
 use crate::cli::output::{Failure, Terminal, duration_text};
 use crate::files::printed;
-use crate::jobs::{JOB_FILE, Job, Network, PlanOptions, Step, plan};
+use crate::jobs::{Division, JOB_FILE, Job, Network, PlanOptions, Step, plan};
 use crate::persist::atomic;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -42,6 +42,20 @@ pub struct PlanJobArguments {
         value_parser = clap::value_parser!(u16).range(1..=1024)
     )]
     cores: u16,
+    /// Refine each section in N shards along the tunnel, tasks of their own that need less memory,
+    /// and join them. Poses differ by a fraction of their 1-σ from those without shards, as those
+    /// of a survey that begins elsewhere do.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    shards: Option<u32>,
+    /// Refine each section in as many shards as it takes for no more than M frames of its own in
+    /// each.
+    #[arg(
+        long,
+        value_name = "M",
+        conflicts_with = "shards",
+        value_parser = clap::value_parser!(u32).range(1..)
+    )]
+    frames_per_shard: Option<u32>,
 }
 
 /// Runs the command.
@@ -52,6 +66,10 @@ pub fn run(arguments: &PlanJobArguments, terminal: &Terminal) -> Result<(), Fail
     let options = PlanOptions {
         steps: arguments.steps.iter().copied().collect(),
         cores: arguments.cores,
+        division: match (arguments.shards, arguments.frames_per_shard) {
+            (_, Some(frames)) => Division::FramesPerShard(frames as usize),
+            (shards, None) => Division::Shards(shards.unwrap_or(1) as usize),
+        },
     };
     if options.steps.contains(&Step::Report) && !options.steps.contains(&Step::Refine) {
         return Err(Failure::usage(

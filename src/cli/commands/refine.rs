@@ -1,12 +1,15 @@
 //! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
 
-use crate::check::{refine_bytes, refine_s, unused_bits_warning};
+use crate::check::{
+    JOIN_SHARE, join_bytes, refine_bytes, refine_s, shard_bytes, shard_share, unused_bits_warning,
+};
 use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::commands::refine_files::{
     FOUND_FILES, REFINED_FILES, check_outputs, stage_refined,
 };
 use crate::cli::commands::refine_memory::check_memory;
+use crate::cli::commands::refine_shards::{ShardNumber, read_shards, write_shard};
 use crate::cli::commands::refine_summary::{print_outputs, print_summary};
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
@@ -17,7 +20,7 @@ use crate::refine::{
     check_input, search_readings,
 };
 use crate::survey::{CalibrationGroup, Survey};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Refines the poses of a survey by photometric bundle adjustment.
@@ -32,7 +35,11 @@ use std::sync::Arc;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch refine my-survey --out refined\n  \
-    tunnelstitch refine my-survey --out refined --calibrate focal,radius")]
+    tunnelstitch refine my-survey --out refined --calibrate focal,radius\n\n\
+    A long survey in two shards, on two machines, and joined:\n  \
+    tunnelstitch refine my-survey --shard 1/2 --out shards\n  \
+    tunnelstitch refine my-survey --shard 2/2 --out shards\n  \
+    tunnelstitch refine my-survey --join shards --out refined")]
 pub struct RefineArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
@@ -101,6 +108,15 @@ pub struct RefineArguments {
     /// exit code is 4 in any case.)
     #[arg(long, value_name = "SHARE", value_parser = share)]
     min_photometric: Option<f64>,
+    /// Refine only shard K of N stretches along the tunnel of as many frames each, counted from 1,
+    /// as far as the last solve, and write shard-K-of-N.state into DIR, for --join. It needs the
+    /// memory of its own frames and of up to 80 beside them at either end.
+    #[arg(long, value_name = "K/N", conflicts_with_all = ["join", "min_photometric", "verbose"])]
+    shard: Option<ShardNumber>,
+    /// Go on from the shards in FOLDER, all of one division: join them, and solve for all frames
+    /// together. The result does not depend on where or in which order the shards were refined.
+    #[arg(long, value_name = "FOLDER")]
+    join: Option<PathBuf>,
     /// Also print the table of global solves and the time of each stage.
     #[arg(long, short)]
     verbose: bool,
@@ -195,9 +211,9 @@ pub fn run(
     let points = arguments.points.as_deref();
     let mut survey = (arguments.reading).open(&arguments.survey, points, terminal)?;
     check_outputs(&survey, &arguments.out)?;
-    check_memory(&survey)?;
+    check_memory(&survey, arguments.memory_bytes(&survey))?;
     if arguments.dry_run.is_set() {
-        return describe(&survey, &options, &arguments.out)?.print(terminal);
+        return describe(&survey, &options, arguments)?.print(terminal);
     }
     if let Some(warning) = unused_bits_warning(&survey) {
         terminal.warn(warning);
@@ -205,6 +221,18 @@ pub fn run(
     let inputs = record::hash_survey(&survey, None)?;
     let origin = resume::origin(&survey, &options, inputs.clone())?;
     let say = |text: &str| terminal.say(text);
+    if let Some(shard) = arguments.shard {
+        let result = arguments.out.join(shard.name());
+        return arguments.resume.run(&result, &origin, say, |checkpoint| {
+            leave_out_overlay(&mut survey, terminal)?;
+            let place = (shard, arguments.out.as_path());
+            write_shard(&survey, &options, place, &origin, checkpoint, terminal)
+        });
+    }
+    let shards = arguments.join.as_deref();
+    let shards = shards
+        .map(|folder| read_shards(folder, &origin))
+        .transpose()?;
     let result = arguments.out.join("refine");
     let (report, json, files) = arguments.resume.run(&result, &origin, say, |checkpoint| {
         // After the check that the run to be continued is of the same frames.
@@ -215,7 +243,7 @@ pub fn run(
             &options,
             &arguments.out,
             record,
-            Some(checkpoint),
+            (shards, Some(checkpoint)),
             terminal,
         )?;
         record.add_to(&mut outputs, &arguments.out.join(RUN_FILE), &inputs)?;
@@ -242,23 +270,35 @@ pub fn run(
     conclude(arguments, &report, terminal)
 }
 
-/// The work of a refinement into `out`, which is checked as far as is possible without frames.
+/// The work of a refinement, which is checked as far as is possible without frames.
 ///
 /// # Errors
 /// Poses, options or measured points that cannot be refined.
-fn describe(survey: &Survey, options: &RefineOptions, out: &Path) -> Result<Job, Failure> {
+fn describe(
+    survey: &Survey,
+    options: &RefineOptions,
+    arguments: &RefineArguments,
+) -> Result<Job, Failure> {
     let points = WallPoints::of_survey(survey)?;
     let input = RefineInput {
         points: points.as_ref(),
         ..RefineInput::from(survey)
     };
     check_input(input, options)?;
-    let path = |name: &&str| out.join(name);
+    let path = |name: &&str| arguments.out.join(name);
+    let (writes, may_write) = match arguments.shard {
+        Some(shard) => (vec![shard.file(&arguments.out)], Vec::new()),
+        None => (
+            REFINED_FILES.iter().map(path).collect(),
+            FOUND_FILES.iter().map(path).collect(),
+        ),
+    };
+    let share = arguments.share_of_work(survey);
     Ok(Job {
-        writes: REFINED_FILES.iter().map(path).collect(),
-        may_write: FOUND_FILES.iter().map(path).collect(),
-        memory_bytes: Some(refine_bytes(survey)),
-        time_s: Some(refine_s(survey, options)),
+        writes,
+        may_write,
+        memory_bytes: Some(arguments.memory_bytes(survey)),
+        time_s: Some(share * refine_s(survey, options)),
         ..Job::of(survey, None)
     })
 }
@@ -288,6 +328,24 @@ fn conclude(
 }
 
 impl RefineArguments {
+    /// Memory of the run, bytes.
+    fn memory_bytes(&self, survey: &Survey) -> u64 {
+        match (self.shard, &self.join) {
+            (Some(ShardNumber { of, .. }), _) => shard_bytes(survey, of),
+            (None, Some(_)) => join_bytes(survey),
+            (None, None) => refine_bytes(survey),
+        }
+    }
+
+    /// Processor time of the run over that of a whole refinement.
+    fn share_of_work(&self, survey: &Survey) -> f64 {
+        match (self.shard, &self.join) {
+            (Some(ShardNumber { of, .. }), _) => shard_share(survey, of),
+            (None, Some(_)) => JOIN_SHARE,
+            (None, None) => 1.0,
+        }
+    }
+
     /// Options for the library.
     fn options(&self) -> RefineOptions {
         RefineOptions {

@@ -11,8 +11,8 @@ use crate::persist::atomic::{self, OutputSet};
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::{
-    EstimatedShape, RefineInput, RefineOptions, RefineReport, Refined, WallPoints,
-    refine_with_checkpoint,
+    EstimatedShape, RefineInput, RefineOptions, RefineReport, Refined, ShardState, WallPoints,
+    join_shards, refine_with_checkpoint,
 };
 use crate::report::{OVERLAY_FILE, REFINEMENT_FILE, SECTIONS_FILE};
 use crate::surface::Bend;
@@ -77,7 +77,8 @@ struct RefineFile<'a> {
     report: &'a RefineReport,
 }
 
-/// Refines a survey, continuing from a checkpoint if there is one, and writes poses.tum,
+/// Refines a survey, from its shards if there are some, continuing from a checkpoint if there is
+/// one, and writes poses.tum,
 /// refine.json and covariance.csv for `out`, shape.json and sections.csv if the wall is deformed,
 /// overlay.png if `overlay` has a mask.
 /// Also returns the text of refine.json and the files, which have not their names yet.
@@ -90,7 +91,7 @@ pub fn stage_refined(
     options: &RefineOptions,
     out: &Path,
     record: &RunRecord,
-    checkpoint: Option<&mut Checkpoint>,
+    (shards, checkpoint): (Option<Vec<ShardState>>, Option<&mut Checkpoint>),
     terminal: &Arc<Terminal>,
 ) -> Result<(Refined, String, OutputSet), Failure> {
     let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
@@ -99,7 +100,10 @@ pub fn stage_refined(
         points: points.as_ref(),
         ..RefineInput::from(survey)
     };
-    let refined = refine_with_checkpoint(input, options, checkpoint, &progress)?;
+    let refined = match shards {
+        Some(shards) => join_shards(input, options, shards, checkpoint, &progress)?,
+        None => refine_with_checkpoint(input, options, checkpoint, &progress)?,
+    };
     let json = json::text(&RefineFile {
         program: PROGRAM,
         command: &record.arguments,

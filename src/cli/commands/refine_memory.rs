@@ -1,6 +1,5 @@
 //! Memory that `refine` needs, checked before it begins.
 
-use crate::check::refine_bytes;
 use crate::cli::output::Failure;
 use crate::render::available_bytes;
 use crate::survey::Survey;
@@ -10,15 +9,16 @@ use crate::survey::Survey;
 const MIN_FREE_BYTES: u64 = 128 << 20;
 
 /// Refuses to begin what would end without memory, if the system reports how much is free.
+/// `bytes`: memory of the run beside [`MIN_FREE_BYTES`].
 ///
 /// # Errors
 /// A temporary [`Failure`] with both numbers.
-pub fn check_memory(survey: &Survey) -> Result<(), Failure> {
-    let needed = refine_bytes(survey) + MIN_FREE_BYTES;
+pub fn check_memory(survey: &Survey, bytes: u64) -> Result<(), Failure> {
+    let needed = bytes + MIN_FREE_BYTES;
     match available_bytes() {
         Some(free) if free < needed => Err(Failure::temporary(format!(
             "refining {} frames takes some {} MiB of memory, and {} MiB are free; end other \
-             programs, raise the limit (ulimit -v), or refine parts of the survey",
+             programs, raise the limit (ulimit -v), or refine it in shards (--shard)",
             survey.frames.len(),
             needed >> 20,
             free >> 20

@@ -36,16 +36,17 @@
 
 use super::atomic::{self, WriteError};
 use super::file_lock::FileLock;
+use super::hashed_file;
 use super::provenance::Input;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fmt::Display;
 use std::fs::TryLockError;
-use std::io::{self, BufWriter, ErrorKind, IntoInnerError, Write};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use tunnelstitch_geometry::files::open_without_links;
 use tunnelstitch_geometry::files::printed;
-use tunnelstitch_geometry::files::{open_without_links, read_regular};
 
 /// Name of the file that identifies the run.
 const ORIGIN_FILE: &str = "origin";
@@ -53,10 +54,6 @@ const ORIGIN_FILE: &str = "origin";
 const STATE_EXTENSION: &str = "state";
 /// Name of the lock file.
 const LOCK_FILE: &str = "lock";
-/// Buffer size of the hasher, bytes.
-const HASH_BUFFER_BYTES: usize = 1 << 17;
-/// Largest file of a state, bytes.
-const MAX_STATE_BYTES: u64 = 16 << 30;
 /// Shortest time between two states.
 const MIN_SAVE_INTERVAL: Duration = Duration::from_millis(250);
 /// Shortest time between two states, as a multiple of the duration of the last save.
@@ -118,7 +115,7 @@ pub struct Origin {
 
 impl Origin {
     /// Describes the difference to another run.
-    fn difference(&self, other: &Self) -> Option<String> {
+    pub(super) fn difference(&self, other: &Self) -> Option<String> {
         if self.program != other.program {
             return Some(format!(
                 "it is of {}, and this is {}",
@@ -319,17 +316,10 @@ impl Checkpoint {
     /// The content of a file, if it is there, without the hash that ends it.
     fn read(&self, file: &str) -> Result<Option<Vec<u8>>, CheckpointError> {
         let path = self.folder.join(file);
-        let mut bytes = match read_regular(&path, MAX_STATE_BYTES) {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(WriteError::new(&path, error).into()),
-        };
-        match bytes.split_last_chunk() {
-            Some((content, hash)) if blake3::hash(content) == blake3::Hash::from(*hash) => {
-                bytes.truncate(content.len());
-                Ok(Some(bytes))
-            }
-            _ => Err(self.damaged(file, "its hash does not match")),
+        match hashed_file::read(&path) {
+            Err(error) if error.kind() == ErrorKind::InvalidData => Err(self.damaged(file, error)),
+            Err(error) => Err(WriteError::new(&path, error).into()),
+            Ok(content) => Ok(content),
         }
     }
 
@@ -339,18 +329,7 @@ impl Checkpoint {
         file: &str,
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), WriteError> {
-        atomic::write(&self.folder.join(file), |writer| {
-            let hashing = Hashing {
-                writer,
-                hasher: blake3::Hasher::new(),
-            };
-            // Buffered, because hashing number by number is slow.
-            let mut hashing = BufWriter::with_capacity(HASH_BUFFER_BYTES, hashing);
-            content(&mut hashing)?;
-            let Hashing { writer, hasher } =
-                hashing.into_inner().map_err(IntoInnerError::into_error)?;
-            writer.write_all(hasher.finalize().as_bytes())
-        })
+        hashed_file::write(&self.folder.join(file), content)
     }
 
     /// Removes the checkpoint at the end of the run.
@@ -374,24 +353,6 @@ fn state_file(name: &str) -> String {
 
 fn is_state(path: &Path) -> bool {
     path.extension() == Some(STATE_EXTENSION.as_ref())
-}
-
-/// A writer that hashes its data.
-struct Hashing<'a, W> {
-    writer: &'a mut W,
-    hasher: blake3::Hasher,
-}
-
-impl<W: Write> Write for Hashing<'_, W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.writer.write(bytes)?;
-        self.hasher.update(&bytes[..written]);
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.writer.flush()
-    }
 }
 
 /// The checkpoint folder of the run that produces `result`: its name with `.unfinished` appended.

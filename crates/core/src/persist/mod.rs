@@ -5,12 +5,15 @@
 //! | --- | --- |
 //! | files and folders written under a temporary name, then renamed | [`atomic`] |
 //! | states of a long run, to resume from | [`checkpoint`] |
+//! | parts that one run hands over to another | [`part_file`] |
 //! | locks against other programs | [`file_lock`] |
 //! | what a result was made from and with | [`provenance`] |
 
 pub mod atomic;
 pub mod checkpoint;
 pub mod file_lock;
+mod hashed_file;
+pub mod part_file;
 pub mod provenance;
 
 pub use atomic::remove_unfinished;

@@ -41,6 +41,40 @@ impl RadialField {
         }
     }
 
+    /// The field of these values at the nodes of some rows of a lattice, metres, to the fourth
+    /// order of the spacing: with `c = (1 − δ²/6) v` along either axis, δ² the second difference.
+    ///
+    /// Source: C. de Boor, G. J. Fix, "Spline approximation by quasiinterpolants", Journal of
+    /// Approximation Theory 8(1), 1973.
+    pub fn through(
+        lattice: SplineLattice,
+        rows: Range<i64>,
+        value_m: impl Fn(WallPoint) -> f64,
+    ) -> Self {
+        let columns = lattice.columns;
+        let nodes = rows
+            .clone()
+            .flat_map(|row| (0..columns).map(move |k| (row, k)));
+        let values: Vec<f64> = nodes
+            .map(|(row, k)| value_m(lattice.node(row, k)))
+            .collect();
+        let sharpened = |before: f64, at: f64, after: f64| at - (before - 2.0 * at + after) / 6.0;
+        let along_s = (0..values.len()).map(|k| {
+            let (start, column) = (k - k % columns, k % columns);
+            let beside = |step: usize| values[start + (column + step) % columns];
+            sharpened(beside(columns - 1), values[k], beside(1))
+        });
+        let along_s: Vec<f64> = along_s.collect();
+        let coefficients_m = (0..along_s.len()).map(|k| {
+            let own = along_s[k];
+            let beside = k.checked_sub(columns).zip(along_s.get(k + columns));
+            beside.map_or(own, |(before, after)| {
+                sharpened(along_s[before], own, *after)
+            })
+        });
+        Self::new(lattice, rows.start, coefficients_m.collect())
+    }
+
     /// The lattice.
     pub fn lattice(&self) -> &SplineLattice {
         &self.lattice

@@ -4,6 +4,7 @@ use super::pose::Pose;
 use super::stamped_pose::StampedPose;
 use crate::camera::Sweep;
 use nalgebra::Vector6;
+use std::ops::Range;
 
 /// The readout times of the rows of frames.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,6 +26,15 @@ impl Shutter {
             readout_s,
             rows,
             times_s: trajectory.iter().map(|stamped| stamped.time_s).collect(),
+        }
+    }
+
+    /// The readout of some of the frames, counted from the first of them.
+    pub fn of_frames(&self, frames: &Range<usize>) -> Self {
+        let last = frames.end.min(self.times_s.len());
+        Self {
+            times_s: self.times_s[frames.start.min(last)..last].to_vec(),
+            ..self.clone()
         }
     }
 

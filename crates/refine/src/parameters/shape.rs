@@ -348,6 +348,14 @@ impl ShapeModel {
         lattices.max_by_key(|(columns, _)| *columns)
     }
 
+    /// The model with one scale alone.
+    pub fn with_only(&self, scale: Scale) -> Self {
+        Self {
+            scales: vec![scale],
+            ..self.clone()
+        }
+    }
+
     /// The model with a lattice of half the spacing added, of the strength `sigma_m`.
     pub fn refined(&self, sigma_m: f64) -> Self {
         let mut model = self.clone();

@@ -14,8 +14,8 @@ pub struct PatchScores(BTreeMap<(i64, i64), PatchScore>);
 /// The score of one patch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PatchScore {
-    /// Gradients of the slots that it concerns.
-    pub slots: BTreeMap<usize, FrameStep>,
+    /// The slots that it concerns, ascending, with their gradients.
+    pub slots: Vec<(usize, FrameStep)>,
     /// Gradient of the shared parameters.
     pub shared: Kappa,
 }
@@ -42,7 +42,15 @@ impl PatchScores {
                 &score.shared,
             );
         }
+        doubled.fit();
         doubled
+    }
+
+    /// Gives back memory that is not used; scores are large for what they are.
+    fn fit(&mut self) {
+        self.0
+            .values_mut()
+            .for_each(|score| score.slots.shrink_to_fit());
     }
 
     /// Adds gradients to those of a patch.
@@ -53,11 +61,14 @@ impl PatchScores {
         shared: &Kappa,
     ) {
         let score = self.0.entry(patch).or_insert_with(|| PatchScore {
-            slots: BTreeMap::new(),
+            slots: Vec::new(),
             shared: Kappa::zeros(),
         });
         for (slot, gradient) in slots {
-            *score.slots.entry(slot).or_insert_with(FrameStep::zeros) += gradient;
+            match score.slots.binary_search_by_key(&slot, |(slot, _)| *slot) {
+                Ok(place) => score.slots[place].1 += gradient,
+                Err(place) => score.slots.insert(place, (slot, *gradient)),
+            }
         }
         score.shared += shared;
     }
@@ -90,6 +101,7 @@ impl PhotometricProblem<'_> {
             let patch = (row.div_euclid(2), column.div_euclid(2));
             scores.add(patch, block.slots.iter().copied().zip(&gradient), &shared);
         })?;
+        scores.fit();
         Ok(scores)
     }
 }

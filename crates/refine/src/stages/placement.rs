@@ -284,7 +284,7 @@ fn bodies(rig: &Rig, trajectory: &[StampedPose]) -> Trajectory {
 
 /// Displacement of the wall's points, on the unrolled wall, by a motion along the gauge: that of
 /// the point that `pose` looks at. `walls`: without and with the motion.
-fn displacement_by(motion: &GaugeMotion, walls: [&dyn Surface; 2], pose: &Pose) -> WallPoint {
+pub fn displacement_by(motion: &GaugeMotion, walls: [&dyn Surface; 2], pose: &Pose) -> WallPoint {
     let [before, after] =
         [(walls[0], *pose), (walls[1], motion.apply(pose))].map(|(wall, pose)| {
             let hit = wall.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()));

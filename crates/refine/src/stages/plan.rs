@@ -31,6 +31,14 @@ pub enum Stage {
     Assess,
 }
 
+impl Stage {
+    /// True for the solve with the dense samples that a refinement ends with, after the solves and
+    /// checks that bring every frame close.
+    pub fn is_last_solve(&self) -> bool {
+        matches!(self, Self::Solve(plan) if plan.sampling.variance_weighting)
+    }
+}
+
 /// The stages of a refinement: track coarsely, check, solve at full size, repair, solve with denser
 /// samples, assess.
 pub fn plan_stages(options: &RefineOptions) -> VecDeque<Stage> {

@@ -65,21 +65,26 @@ impl<'a> Session<'a> {
         setup: &Setup,
         state: impl FnOnce() -> PipelineState,
     ) -> Result<(), ProblemError> {
-        let elapsed_s = self.elapsed_s();
-        if let Some(checkpoint) = &mut self.checkpoint
-            && checkpoint.is_due()
-        {
-            let snapshot = Snapshot {
-                state: state(),
-                light: setup.frames.light(),
-                hidden_bands: setup.hidden_bands.clone(),
-                timings: self.timings.clone(),
-                elapsed_s,
-            };
-            let kept = checkpoint.keep(NAME, &snapshot);
-            kept.map_err(CheckpointError::from)?;
+        let is_due = |checkpoint: &mut &mut Checkpoint| checkpoint.is_due();
+        if self.checkpoint.as_mut().is_some_and(is_due) {
+            let snapshot = self.snapshot_of(setup, state());
+            if let Some(checkpoint) = &mut self.checkpoint {
+                let kept = checkpoint.keep(NAME, &snapshot);
+                kept.map_err(CheckpointError::from)?;
+            }
         }
         Ok(())
+    }
+
+    /// The snapshot of a state.
+    pub fn snapshot_of(&self, setup: &Setup, state: PipelineState) -> Snapshot {
+        Snapshot {
+            state,
+            light: setup.frames.light(),
+            hidden_bands: setup.hidden_bands.clone(),
+            timings: self.timings.clone(),
+            elapsed_s: self.elapsed_s(),
+        }
     }
 
     /// Reports the place of the state's first stage in the whole refinement.

@@ -260,7 +260,7 @@ fn loosened(rig: &Rig, jitter: &Jitter) -> Rig {
 ///
 /// # Errors
 /// [`RefineError::OnlyRound`], [`RefineError::LensOfRig`].
-fn calibration_of(
+pub fn calibration_of(
     input: &RefineInput,
     options: &RefineOptions,
     initial: &[Pose],

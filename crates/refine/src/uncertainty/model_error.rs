@@ -136,12 +136,13 @@ impl EstimateErrors {
             };
             system.draw(pattern.columns(), frames)
         };
-        let mut scores = problem.patch_scores(&solution.unknowns)?;
-        let finest = scores.clone();
+        let finest = problem.patch_scores(&solution.unknowns)?;
+        let mut doubled: Option<PatchScores> = None;
         let mut finest_dispersion = None;
         let mut largest: Option<(ErrorDraws, Patches)> = None;
         for blocks in PATCH_BLOCKS {
-            let draws = draw(&scores, posterior, curvature);
+            let scores = doubled.as_ref().unwrap_or(&finest);
+            let draws = draw(scores, posterior, curvature);
             let dispersion = draws.quadratic / of_noise.determined;
             finest_dispersion.get_or_insert(dispersion);
             let before = largest.as_ref().map_or(0.0, |l| l.1.dispersion);
@@ -149,7 +150,7 @@ impl EstimateErrors {
             if dispersion > before.max(by_chance) {
                 largest = Some((draws, Patches { blocks, dispersion }));
             }
-            scores = scores.doubled();
+            doubled = Some(scores.doubled());
         }
         Ok(Some(match largest {
             Some((draws, patches)) => Self {

@@ -1,0 +1,135 @@
+//! Surveys that are refined in shards.
+
+use crate::support::outputs::outputs;
+use crate::support::{self, edit, fail, json, succeed, text};
+use std::path::{Path, PathBuf};
+
+/// A small survey, refined as one into `plain`.
+fn refined(dir: &Path) -> PathBuf {
+    let survey = dir.join("s");
+    support::simulate(
+        &survey,
+        &["--frames", "14", "--size", "128x96", "--seed", "3"],
+    );
+    succeed(&["refine", text(&survey), "--out", text(&dir.join("plain"))]);
+    survey
+}
+
+/// Refines a shard into the folder `shards`.
+fn refine_shard(survey: &Path, shard: &str, dir: &Path) {
+    let out = dir.join("shards");
+    succeed(&[
+        "refine",
+        text(survey),
+        "--shard",
+        shard,
+        "--out",
+        text(&out),
+    ]);
+}
+
+/// Poses of a file: position, metres, and quaternion x y z w.
+fn poses(path: &Path) -> Vec<[f64; 7]> {
+    let content = std::fs::read_to_string(path).unwrap();
+    let lines = content.lines().filter(|line| !line.starts_with('#'));
+    let pose = |line: &str| {
+        let numbers = line.split_whitespace().skip(1);
+        let numbers: Vec<f64> = numbers.map(|number| number.parse().unwrap()).collect();
+        numbers.try_into().unwrap()
+    };
+    lines.map(pose).collect()
+}
+
+/// Checks that poses differ by less than a twentieth of their uncertainty.
+fn assert_near(left: &Path, right: &Path) {
+    let report = json(&left.join("refine.json"));
+    let [left, right] = [left, right].map(|folder| poses(&folder.join("poses.tum")));
+    assert_eq!(left.len(), right.len());
+    let mut largest = 0.0f64;
+    for (k, (a, b)) in left.iter().zip(&right).enumerate() {
+        let sigma = &report["frames"][k]["sigma"];
+        let apart = |range: std::ops::Range<usize>| -> f64 {
+            let squares = range.map(|i| (a[i] - b[i]).powi(2));
+            squares.sum::<f64>().sqrt()
+        };
+        let translation = apart(0..3) / sigma["translation_m"].as_f64().unwrap();
+        let rotation = 2.0 * apart(3..7).to_degrees() / sigma["rotation_deg"].as_f64().unwrap();
+        largest = largest.max(translation).max(rotation);
+    }
+    assert!(largest < 0.05, "{largest} σ");
+}
+
+#[test]
+fn one_shard_is_the_survey() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = refined(dir.path());
+    refine_shard(&survey, "1/1", dir.path());
+    let [shards, joined, plain] = ["shards", "joined", "plain"].map(|name| dir.path().join(name));
+    let join = ["--join", text(&shards), "--out", text(&joined)];
+    succeed(&[&["refine", text(&survey)], &join[..]].concat());
+    assert_eq!(outputs(&joined), outputs(&plain));
+}
+
+#[test]
+fn a_job_of_shards_has_the_same_bytes_in_any_order_and_the_poses_of_a_single_run() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = refined(dir.path());
+    let [forth, back] = ["forth", "back"].map(|name| dir.path().join(name));
+    let steps = ["--shards", "2", "--steps", "refine,stitch"];
+    for job in [&forth, &back] {
+        succeed(&[&["plan-job", text(&survey), "--out", text(job)], &steps[..]].concat());
+    }
+    succeed(&["run-job", text(&forth)]);
+    let early = fail(&["run-task", text(&back), "s.refine"], 75);
+    assert!(early.contains("comes after s.refine-1"), "{early}");
+    for task in ["s.refine-2", "s.refine-1", "s.refine", "s.stitch"] {
+        succeed(&["run-task", text(&back), task]);
+    }
+    // survey.toml names the frames as the folder of the job sees them.
+    let results = |job: &Path| {
+        let mut files = outputs(&job.join("s/refined"));
+        files.remove(Path::new("survey.toml"));
+        files
+    };
+    assert_eq!(results(&forth), results(&back));
+    let panorama = |job: &Path| std::fs::read(job.join("s/panorama.tif")).unwrap();
+    assert_eq!(panorama(&forth), panorama(&back));
+    assert_near(&dir.path().join("plain"), &forth.join("s/refined"));
+}
+
+#[test]
+fn shards_that_do_not_belong_together_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("s");
+    support::simulate(&survey, &["--frames", "4", "--size", "96x72"]);
+    let [shards, joined] = ["shards", "joined"].map(|name| dir.path().join(name));
+    let join = [
+        "refine",
+        text(&survey),
+        "--join",
+        text(&shards),
+        "--out",
+        text(&joined),
+    ];
+    assert!(fail(&join, 3).contains("shards"));
+    refine_shard(&survey, "1/2", dir.path());
+    let message = fail(&join, 3);
+    assert!(message.contains("shard-2-of-2.state"), "{message}");
+    refine_shard(&survey, "1/1", dir.path());
+    let message = fail(&join, 3);
+    assert!(message.contains("of one division"), "{message}");
+    std::fs::remove_file(shards.join("shard-1-of-2.state")).unwrap();
+    edit(&survey.join("survey.toml"), "2.0", "2.1");
+    let message = fail(&join, 3);
+    assert!(message.contains("part of another result"), "{message}");
+    let none = [
+        "refine",
+        text(&survey),
+        "--shard",
+        "1/9",
+        "--out",
+        text(&shards),
+    ];
+    let message = fail(&none, 3);
+    assert!(message.contains("there is no shard 1 of 9"), "{message}");
+}
