@@ -50,7 +50,7 @@ fn a_diameter_given_for_the_radius_is_named() {
     }
 }
 
-/// What is left of bricks correlates, but not as it should.
+/// Blurred bricks correlate with each other, but not as frames at right poses do.
 #[test]
 fn a_survey_in_which_nothing_matches_ends_early() {
     let dir = tempfile::tempdir().unwrap();
