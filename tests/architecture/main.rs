@@ -15,7 +15,7 @@ mod tree;
 use folder_order::FolderOrder;
 use sources::in_all_files;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tree::Tree;
 
 #[test]
@@ -48,6 +48,18 @@ fn doc_comments_open_with_the_subject() {
 #[test]
 fn constants_are_named_as_bounds_and_counts() {
     hold(in_all_files(lines::constants_with_vague_names));
+}
+
+/// The estimator has so many tuned numbers, and no more than 60.
+#[test]
+fn tuned_numbers_are_as_many_as_stated() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |path: &str| std::fs::read_to_string(root.join(path)).unwrap();
+    let thresholds = read("crates/refine/src/thresholds.rs");
+    let count = thresholds.matches("pub const").count();
+    assert!(count <= 60, "{count}");
+    let stated = format!("`crates/refine/src/thresholds.rs`; there are {count}.");
+    assert!(read("CONTRIBUTING.md").contains(&stated), "{count}");
 }
 
 #[test]

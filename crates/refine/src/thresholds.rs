@@ -165,14 +165,6 @@ pub mod registration {
 
 /// Thresholds of `tracking/correlation_search.rs`.
 pub mod correlation_search {
-    /// Deviation from the prior's prediction that the search covers in each direction, σ.
-    ///
-    /// Higher: poses farther from the prior are found, in more time.
-    ///
-    /// Chosen by: derivation. One of three normal deviates exceeds it about once in a thousand
-    /// frames.
-    pub const MAX_DEVIATION_SIGMA: f64 = 3.5;
-
     /// Number ν of samples that share one independent piece of texture.
     ///
     /// Higher: the pixels weigh less against the prior.
@@ -254,14 +246,6 @@ pub mod tile {
 
 /// Thresholds of `problem/*.rs`.
 pub mod photometric_problem {
-    /// Least variance that detail finer than pixels adds to a pixel, over the variance of its
-    /// noise, for the wall to be solved for jointly.
-    ///
-    /// Higher: fewer walls are solved for jointly. Chosen by: derivation: below it, less than a
-    /// fortieth of the error is at stake. On bricks of 30 × 10 pixels the ratio is 1.1, 0.35 and
-    /// 0.13 with noise of 1, 2 and 4 grey levels, on concrete 0.02 with 2.
-    pub const MIN_ALIASED_VARIANCE_RATIO: f64 = 0.05;
-
     /// Largest factor by which the variance of the residuals may fall short of the sensor's;
     /// beyond, the sensor's is taken for fine texture and ignored.
     ///
@@ -276,12 +260,6 @@ pub mod joint {
     ///
     /// Higher: sharper edges, more time and memory. Chosen by: unknown.
     pub const SAMPLES_PER_PIXEL: f64 = 3.0;
-
-    /// Largest step that ends the joint solve, standard deviations of the estimates.
-    ///
-    /// Higher: fewer of its expensive steps. Chosen by: the step after one of this length is a
-    /// tenth of it.
-    pub const MAX_FINAL_STEP_SIGMA: f64 = 0.3;
 }
 
 /// Thresholds of `solver/gauss_newton.rs, solve_record.rs`.

@@ -8,6 +8,10 @@ use crate::tiles::interpolation::Interpolation;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
+/// Largest step that ends the joint solve, standard deviations of the estimates: the step after one
+/// of this length is a tenth of it.
+const MAX_JOINT_STEP_SIGMA: f64 = 0.3;
+
 /// One step of the estimator ([`crate::stages::run::run_stage`]).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Stage {
@@ -112,7 +116,7 @@ impl SolvePlan {
                 ..last.sampling
             },
             stopping: Stopping {
-                step_sigma: joint::MAX_FINAL_STEP_SIGMA,
+                step_sigma: MAX_JOINT_STEP_SIGMA,
                 ..last.stopping
             },
         }

@@ -6,9 +6,9 @@
 
 use crate::model::context::EstimationContext;
 use crate::samples::footprints::RESOLVED_RANGE_RADII;
-use crate::thresholds::correlation_search::{MAX_DEVIATION_SIGMA, PITCH_STEP_RAD};
+use crate::thresholds::correlation_search::PITCH_STEP_RAD;
 use crate::tracking::search_grid::{
-    SearchGrid, TURN_STEP_SAMPLES, Turns, all_turns, symmetric_steps,
+    MAX_DEVIATION_SIGMA, SearchGrid, TURN_STEP_SAMPLES, Turns, all_turns, symmetric_steps,
 };
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use tunnelstitch_geometry::camera::Camera;

@@ -6,9 +6,8 @@
 //! (`sin α = r/d`), by `δ r/sin² α = δ d²/r` along the tunnel. They are tried one by one.
 
 use crate::model::context::EstimationContext;
-use crate::thresholds::correlation_search::MAX_DEVIATION_SIGMA;
 use crate::tracking::search_grid::{
-    SearchGrid, TURN_STEP_SAMPLES, Turns, all_turns, symmetric_steps,
+    MAX_DEVIATION_SIGMA, SearchGrid, TURN_STEP_SAMPLES, Turns, all_turns, symmetric_steps,
 };
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use tunnelstitch_geometry::surface::mean_radius_m;

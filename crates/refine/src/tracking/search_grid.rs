@@ -9,6 +9,10 @@
 use nalgebra::Vector2;
 use tunnelstitch_geometry::trajectory::Pose;
 
+/// Deviation from the prior's prediction that the search covers in each direction, σ: one of three
+/// normal deviates exceeds it about once in a thousand frames.
+pub const MAX_DEVIATION_SIGMA: f64 = 3.5;
+
 /// Step between turns: motion of the picture that its shift does not make up for, samples. The
 /// right turn is within a sample.
 pub const TURN_STEP_SAMPLES: f64 = 2.0;
