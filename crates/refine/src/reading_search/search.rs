@@ -86,7 +86,7 @@ fn among_all_pairs<'r>(
         return Ok(Vec::new());
     }
     let mut pictures = PicturePairs::load(survey, &firsts)?;
-    let comparison = Comparison {
+    let mut comparison = Comparison {
         of_given: pictures.register(given, |_| true)?,
         telling: vec![true; firsts.len()],
         least_nats,
@@ -99,9 +99,11 @@ fn among_all_pairs<'r>(
         for reading in readings {
             found.extend(compare(&mut pictures, &comparison, reading)?);
         }
-        if found.is_empty() {
+        let Some(best_nats) = found.iter().map(|one| one.log_odds).reduce(f64::max) else {
             break;
-        }
+        };
+        // Less than that is not named beside it.
+        comparison.least_nats = least_nats.max(best_nats - MAX_DEFICIT_NATS);
     }
     Ok(found)
 }
