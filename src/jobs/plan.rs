@@ -5,7 +5,7 @@ use super::job::{Job, Needs, Step, Task};
 use super::network::{Network, Section};
 use crate::check::{Effort, JOIN_SHARE, join_bytes, refine_processor_s, shard_bytes, shard_share};
 use crate::files::printed;
-use crate::refine::RefineOptions;
+use crate::refine::{RefineOptions, ShardNumber};
 use crate::render::native_px_per_metre;
 use crate::survey::Survey;
 use std::collections::BTreeSet;
@@ -176,11 +176,16 @@ impl Call<'_> {
 
     /// The command of a shard of the refinement, and its output.
     fn shard(&self, number: usize) -> (Vec<String>, String) {
-        let (folder, of) = (self.shards_folder(), self.shards);
-        let shard = format!("{number}/{of}");
+        let folder = self.shards_folder();
+        let shard = ShardNumber {
+            number,
+            of: self.shards,
+        };
+        let output = shard.file(Path::new(&folder));
+        let shard = shard.to_string();
         let words = ["--shard", shard.as_str(), "--out", folder.as_str()];
         let survey = self.survey.to_string_lossy();
-        let output = format!("{folder}/shard-{number}-of-{of}.state");
+        let output = output.to_string_lossy().into_owned();
         (command(Step::Refine, &survey, words), output)
     }
 

@@ -1,6 +1,6 @@
 //! Masks and ignored regions of the wall, through the program.
 
-use crate::support::{edit, fail, simulate, succeed, text};
+use crate::support::{edit, fail, simulate, succeed, text, wall_px};
 use image::GrayImage;
 use nalgebra::Vector2;
 use serde_json::Value;
@@ -47,11 +47,8 @@ fn refined(survey: &Path) -> (Value, f64) {
         "--json",
         "--quiet",
     ]);
-    let survey = Survey::open(survey).unwrap();
-    let poses: Vec<Pose> = poses_of(&survey.read_poses(&out.join("poses.tum")).unwrap());
-    let truth = poses_of(survey.truth.as_deref().unwrap());
-    let error = wall_error(survey.surface.as_ref(), &survey.cameras, &poses, &truth).unwrap();
-    (serde_json::from_str(&json).unwrap(), error.px.rms)
+    let error_px = wall_px(survey, &out.join("poses.tum"));
+    (serde_json::from_str(&json).unwrap(), error_px)
 }
 
 /// The frames' mean 1-σ on the wall, pixels, and the number of uncertain frames.

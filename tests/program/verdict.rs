@@ -1,15 +1,7 @@
 //! The verdict: whether a result may be used, and what it says where the model is wrong.
 
-use crate::support::{edit, fail, json, simulate, succeed, text};
+use crate::support::{edit, fail, json, simulate, succeed, text, wall_px};
 use std::path::Path;
-
-/// Wall error of refined poses, root mean square, pixels.
-fn wall_px(survey: &Path, poses: &Path, out: &Path) -> f64 {
-    let arguments = ["compare", text(survey), "--refined", text(poses), "--out"];
-    succeed(&[&arguments[..], &[text(out), "--quiet"]].concat());
-    let compared = json(&out.join("compare.json"));
-    compared["refined"]["wall"]["px"]["rms"].as_f64().unwrap()
-}
 
 /// Poses of a TUM file.
 fn poses(path: &Path) -> Vec<tunnelstitch::trajectory::StampedPose> {
@@ -97,7 +89,7 @@ fn a_lens_that_is_not_exact_enlarges_sigma() {
     let sigmas = report["frames"].as_array().unwrap().iter();
     let squares = sigmas.map(|frame| frame["sigma"]["wall_px"].as_f64().unwrap().powi(2));
     let stated = (squares.sum::<f64>() / 36.0).sqrt();
-    let error = wall_px(&survey, &out.join("poses.tum"), &path("compared"));
+    let error = wall_px(&survey, &out.join("poses.tum"));
     assert!(
         (0.5..3.0).contains(&(stated / error)),
         "{stated} stated, {error}"

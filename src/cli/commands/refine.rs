@@ -9,15 +9,15 @@ use crate::cli::commands::refine_files::{
     FOUND_FILES, REFINED_FILES, check_outputs, stage_refined,
 };
 use crate::cli::commands::refine_memory::check_memory;
-use crate::cli::commands::refine_shards::{ShardNumber, read_shards, write_shard};
+use crate::cli::commands::refine_shards::{read_shards, write_shard};
 use crate::cli::commands::refine_summary::{print_outputs, print_summary};
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
 };
 use crate::progress::Progress;
 use crate::refine::{
-    FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, WallPoints,
-    check_input, search_readings,
+    FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, ShardNumber,
+    WallPoints, check_input, search_readings,
 };
 use crate::survey::{CalibrationGroup, Survey};
 use std::path::PathBuf;

@@ -2,9 +2,8 @@
 
 use crate::model::frame_states::FrameStates;
 use crate::parameters::frame_estimate::FrameEstimate;
-use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::median::upper_median;
-use tunnelstitch_geometry::surface::{Gauge, GaugeMotion, Surface, sighted_wall};
+use tunnelstitch_geometry::surface::{Gauge, GaugeMotion};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// Difference of a stretch from the one before where both are right: the motion along the gauge,
@@ -59,30 +58,6 @@ pub fn common_inliers(
             .all(|(state, first)| state.rejections[frame - first].is_none())
     };
     range.filter(is_inlier).collect()
-}
-
-/// Distance between two poses of a frame, pixels in the middle of its picture, or where else both
-/// see the wall: the mean over middle and corners; infinite if they see none.
-pub fn distance_px(
-    (surface, cameras): (&dyn Surface, &Cameras),
-    frame: usize,
-    [a, b]: [&Pose; 2],
-) -> f64 {
-    let camera = cameras.of(frame);
-    let distances = camera
-        .corner_and_centre_rays()
-        .into_iter()
-        .filter_map(|ray| {
-            let hit = sighted_wall(surface, camera, a, &ray).ok()?;
-            let seen = camera.project(&b.to_camera(&hit.x_w))?;
-            Some((seen - camera.project(&ray)?).norm())
-        });
-    let (sum, count) = distances.fold((0.0, 0.0), |(sum, n), d| (sum + d, n + 1.0));
-    if count > 0.0 {
-        sum / count
-    } else {
-        f64::INFINITY
-    }
 }
 
 #[cfg(test)]

@@ -5,10 +5,11 @@ use crate::model::frame_states::FrameStates;
 use crate::model::rejection::RejectionReason;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::shards::alignment::{ShardAlignment, common_inliers, distance_px};
+use crate::shards::alignment::{ShardAlignment, common_inliers};
 use crate::shards::division::Shard;
 use crate::shards::state::StraightShard;
 use crate::stages::setup::Setup;
+use crate::tracking::pose_separation::separation_px;
 use std::ops::Range;
 use tunnelstitch_geometry::numerics::median::upper_median;
 use tunnelstitch_geometry::surface::GaugeMotion;
@@ -102,11 +103,11 @@ fn align(
     };
     let (own, neighbours) = (of(states, shard), of(states_before, before));
     let alignment = ShardAlignment::of_common(&gauge, &own, &neighbours);
-    let wall = (context.surface.as_ref(), &context.cameras);
+    let surface = context.surface.as_ref();
     let distances = common.iter().zip(own.iter().zip(&neighbours));
     let distances_px = distances.map(|(k, (own, neighbour))| {
         let aligned = alignment.motion.apply(&own.pose);
-        distance_px(wall, *k, [&neighbour.pose, &aligned])
+        separation_px(surface, context.cameras.of(*k), &neighbour.pose, &aligned)
     });
     let distances_px: Vec<f64> = distances_px.collect();
     let median_px = upper_median(distances_px.clone()).unwrap_or(0.0);

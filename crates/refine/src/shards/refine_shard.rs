@@ -6,6 +6,7 @@ use crate::options::RefineOptions;
 use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS};
 use crate::pipeline::{Pause, run};
 use crate::shards::division::{Shard, options_of};
+use crate::shards::shard_number::ShardNumber;
 use crate::shards::state::{ShardEnd, ShardState, StraightShard};
 use crate::stages::plan::Stage;
 use crate::stages::session::Session;
@@ -17,15 +18,15 @@ use tunnelstitch_core::progress::Progress;
 use tunnelstitch_core::survey::PoseGap;
 use tunnelstitch_geometry::trajectory::{Shutter, StampedPose, poses_of};
 
-/// Refines the stretch `number` (from 1) of `of` equal ones of a survey as far as the last solve,
-/// with snapshots kept in a checkpoint.
+/// Refines one of equal stretches of a survey as far as the last solve, with snapshots kept in a
+/// checkpoint.
 ///
 /// # Errors
 /// [`RefineError`].
 pub fn refine_shard<'a>(
     input: impl Into<RefineInput<'a>>,
     options: &RefineOptions,
-    (number, of): (usize, usize),
+    ShardNumber { number, of }: ShardNumber,
     checkpoint: Option<&mut Checkpoint>,
     progress: &Arc<dyn Progress>,
 ) -> Result<ShardState, RefineError> {

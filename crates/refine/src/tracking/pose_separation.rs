@@ -1,5 +1,6 @@
-//! Distance between two poses of a frame, measured on the wall.
+//! Distance between two poses of a frame, measured on the wall or in the picture.
 
+use nalgebra::Vector3;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::{Surface, shortest_arc, sighted_wall};
 use tunnelstitch_geometry::trajectory::Pose;
@@ -11,17 +12,33 @@ use tunnelstitch_geometry::trajectory::Pose;
 /// taken for one, so the ambiguity test must find them different.
 pub fn separation_m(surface: &dyn Surface, camera: &Camera, a: &Pose, b: &Pose) -> f64 {
     let perimeter = surface.perimeter_m();
-    let (mut sum_m, mut count) = (0.0, 0.0);
-    for ray_c in camera.corner_and_centre_rays() {
-        let hit = |pose: &Pose| sighted_wall(surface, camera, pose, &ray_c).ok();
-        if let (Some(a), Some(b)) = (hit(a), hit(b)) {
-            let (a, b) = (a.wall, b.wall);
-            sum_m += shortest_arc(a.s_m - b.s_m, perimeter).hypot(a.h_m - b.h_m);
-            count += 1.0;
-        }
-    }
+    mean_over_view(camera, |ray_c| {
+        let hit = |pose: &Pose| sighted_wall(surface, camera, pose, ray_c).ok();
+        let (a, b) = (hit(a)?.wall, hit(b)?.wall);
+        Some(shortest_arc(a.s_m - b.s_m, perimeter).hypot(a.h_m - b.h_m))
+    })
+}
+
+/// Distance between two poses of a frame in its picture, pixels: between where the wall is that the
+/// first one sees through the middle and the corners, the mean over those that both see.
+///
+/// It is infinite if there is none.
+pub fn separation_px(surface: &dyn Surface, camera: &Camera, a: &Pose, b: &Pose) -> f64 {
+    mean_over_view(camera, |ray_c| {
+        let hit = sighted_wall(surface, camera, a, ray_c).ok()?;
+        let seen = camera.project(&b.to_camera(&hit.x_w))?;
+        Some((seen - camera.project(ray_c)?).norm())
+    })
+}
+
+/// Mean of a distance over the rays of the picture's middle and corners that have one; infinite if
+/// none has.
+fn mean_over_view(camera: &Camera, distance: impl Fn(&Vector3<f64>) -> Option<f64>) -> f64 {
+    let rays = camera.corner_and_centre_rays();
+    let distances = rays.iter().filter_map(distance);
+    let (sum, count) = distances.fold((0.0, 0.0), |(sum, count), d| (sum + d, count + 1.0));
     if count > 0.0 {
-        sum_m / count
+        sum / count
     } else {
         f64::INFINITY
     }
@@ -30,7 +47,7 @@ pub fn separation_m(surface: &dyn Surface, camera: &Camera, a: &Pose, b: &Pose) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{UnitQuaternion, Vector3};
+    use nalgebra::UnitQuaternion;
     use tunnelstitch_geometry::surface::Circle;
 
     /// A camera that looks along the tunnel: its corners see the wall, its middle does not.
