@@ -288,8 +288,7 @@ pub mod stopping {
     pub const INTERMEDIATE_STEP_SIGMA: f64 = 2.0;
 }
 
-/// Thresholds of `validation/pairwise_ncc.rs`, `validation/contradictions.rs` and
-/// `validation/blurred_frames.rs`.
+/// Thresholds of `validation/pairwise_ncc.rs` and `validation/blurred_frames.rs`.
 pub mod pairwise_ncc {
     /// Half width of the window of local contrast in the coarse comparison, pixels of the level.
     ///
@@ -304,6 +303,20 @@ pub mod pairwise_ncc {
     ///
     /// Chosen by: unknown.
     pub const FINE_WINDOW_PX: usize = 3;
+
+    /// Pyramid level of the fine comparison.
+    ///
+    /// Higher: less noise, and less fine detail.
+    ///
+    /// Chosen by: small against a brick's edge, and half the noise of full size.
+    pub const FINE_LEVEL: usize = 1;
+
+    /// Distance between samples along each axis, pixels of the level.
+    ///
+    /// Higher: fewer samples, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const STRIDE_PX: f64 = 4.0;
 
     /// Correlation, corrected for noise, below which two frames contradict each other.
     ///
@@ -321,13 +334,6 @@ pub mod pairwise_ncc {
     /// Chosen by: unknown.
     pub const MIN_SHARE_WITHOUT_OUTLIERS: f64 = 0.5;
 
-    /// Share of a frame's samples in contradicting pairs up to which it is kept.
-    ///
-    /// Higher: fewer frames are rejected.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_CONTRADICTING_SHARE: f64 = 0.15;
-
     /// Ratio of a frame's variance of fine detail to that of its median partner below which it is
     /// blurred.
     ///
@@ -337,59 +343,29 @@ pub mod pairwise_ncc {
     pub const MIN_SHARPNESS_RATIO: f64 = 0.5;
 }
 
-/// Thresholds of `validation/pairwise_lucas_kanade.rs`, `validation/lucas_kanade_template.rs` and
-/// `validation/lucas_kanade_fit.rs`.
-pub mod pairwise_lucas_kanade {
-    /// Pyramid level at which displacements are measured.
-    ///
-    /// Higher: less noise, but smaller displacements are missed.
-    ///
-    /// Chosen by: small against a brick's edge, and half the noise of full size.
-    pub const LEVEL: usize = 1;
-
-    /// Distance between samples along each axis, pixels of the level.
-    ///
-    /// Higher: fewer samples, in less time.
-    ///
-    /// Chosen by: unknown.
-    pub const STRIDE_PX: f64 = 4.0;
-
-    /// Root mean square displacement beyond which the iterations have diverged, pixels of the
-    /// level.
-    ///
-    /// Higher: larger displacements are measured, chance matches among them.
-    ///
-    /// Chosen by: Gauss–Newton finds no larger displacement.
-    pub const MAX_DISPLACEMENT_PX: f64 = 8.0;
-
-    /// Ratio of a sample's squared slope to the median one beyond which its influence no longer
-    /// grows.
-    ///
-    /// Higher: glints weigh more.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_SQUARED_SLOPE_RATIO: f32 = 10.0;
-}
-
 /// Thresholds of `validation/inconsistent_frames.rs`.
 pub mod inconsistent_frames {
-    /// Correlation below which two frames with enough texture to be measured show different things.
+    /// Share of a frame's samples in contradicting pairs up to which it is kept.
     ///
-    /// Higher: more pairs are misaligned.
+    /// Higher: fewer frames are rejected.
     ///
     /// Chosen by: unknown.
-    pub const MIN_CORRELATION: f64 = 0.3;
+    pub const MAX_CONTRADICTING_SHARE: f64 = 0.15;
 
-    /// σ of a displacement up to which a pair ties its frames to each other, pixels of full size.
+    /// 1-σ up to which the relation of two cameras of a rig connects their frames, pixels of full
+    /// size.
     ///
     /// Higher: fewer frames are disconnected.
     ///
     /// Chosen by: unknown.
-    pub const MAX_TYING_SIGMA_PX: f64 = 1.0;
+    pub const MAX_RELATION_SIGMA_PX: f64 = 1.0;
+}
 
+/// Thresholds of `validation/disagreement.rs`.
+pub mod disagreement {
     /// Share of a frame's weight that the robust loss may reject. Things before the wall, glints
     /// and oblique views cost a right frame some; whether its pose is right is decided by its
-    /// alignment with others.
+    /// comparison with others.
     ///
     /// Higher: fewer frames are rejected.
     ///

@@ -1,21 +1,12 @@
 //! Quantiles for tests whose false-alarm rates add up to one of the whole survey.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal};
 
 /// The one-sided quantile z of the standard normal distribution that `tests` independent tests
 /// exceed with the probability `alpha` at the most (Bonferroni).
 pub fn normal_quantile(alpha: f64, tests: usize) -> f64 {
     let rate = alpha / tests.max(1) as f64;
     Normal::standard().inverse_cdf(1.0 - rate)
-}
-
-/// [`normal_quantile`] of Student's t distribution, for variables whose σ is estimated with a
-/// number of degrees of freedom; infinite without any.
-pub fn student_quantile(alpha: f64, tests: usize, freedoms: f64) -> f64 {
-    let rate = alpha / tests.max(1) as f64;
-    // The quantile of 1 − rate would be lost in rounding.
-    let student = StudentsT::new(0.0, 1.0, freedoms);
-    student.map_or(f64::INFINITY, |student| -student.inverse_cdf(rate))
 }
 
 /// Bounds between which a χ² variable with `freedoms` degrees of freedom lies but for the
@@ -42,9 +33,6 @@ mod tests {
     fn quantiles_are_those_of_tables() {
         assert!((normal_quantile(0.025, 1) - 1.959_964).abs() < 1e-5);
         assert!((normal_quantile(0.001, 1000) - 4.753_424).abs() < 1e-3);
-        assert!((student_quantile(0.01, 10, 5.0) - 5.893_430).abs() < 1e-3);
-        assert!((student_quantile(0.001, 1000, 1e6) - 4.753_5).abs() < 1e-3);
-        assert_eq!(student_quantile(0.001, 1000, 0.0), f64::INFINITY);
         let (low, high) = chi_squared_bounds(0.05, 10.0).unwrap();
         assert!((low - 3.246_973).abs() < 1e-3 && (high - 20.483_177).abs() < 1e-3);
         assert!(chi_squared_bounds(0.05, 0.0).is_none());

@@ -21,8 +21,8 @@ use crate::uncertainty::frame_sigma::FrameSigma;
 use crate::uncertainty::rolling_shutter_test::estimate_readout;
 use crate::uncertainty::shape_report::{EstimatedShape, ShapeReport};
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
-use crate::validation::inconsistent_frames::{find_inconsistent_frames, relation_ties};
-use crate::validation::pairwise_lucas_kanade::align_pairs;
+use crate::validation::inconsistent_frames::{find_inconsistent_frames, known_relations};
+use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 use crate::verdict::frame_verdict::FrameEvidence;
 
 /// Runs the stage on the last full-size solve.
@@ -142,9 +142,9 @@ fn reject_inconsistent(
     state: &mut PipelineState,
 ) -> Result<(), ProblemError> {
     let (count, finest) = (setup.count(), setup.handover_level());
-    let pairs = align_pairs(context, finest, &state.frames, &(0..count))?;
-    let ties = relation_ties(context);
-    for (frame, rejection) in find_inconsistent_frames(&pairs, &ties, count, setup.options) {
+    let pairs = compute_pairwise_ncc(context, finest, &state.frames, &(0..count))?;
+    let relations = known_relations(context);
+    for (frame, rejection) in find_inconsistent_frames(&pairs, &relations, count) {
         state.frames.rejections[frame].get_or_insert(rejection);
     }
     Ok(())

@@ -19,7 +19,7 @@ use crate::tracking::lamp_search::find_lamp;
 use crate::tracking::shading_correction::correct_once;
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
-use crate::validation::inconsistent_frames::reject_disagreeing_frames;
+use crate::validation::disagreement::reject_disagreeing_frames;
 
 /// Solves after which the strengths of the shape are not learned again.
 const MAX_LEARNING_SOLVES: usize = 4;

@@ -9,7 +9,7 @@ use crate::stages::state::Estimation;
 use crate::thresholds::assessment::MAX_PAIR_ITERATIONS;
 use crate::tracking::track::register_rejected;
 use crate::validation::blurred_frames::find_blurred_frames;
-use crate::validation::contradictions::find_contradictions;
+use crate::validation::inconsistent_frames::find_contradictions;
 use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 
 /// Runs the stage at the finest level of tracking.

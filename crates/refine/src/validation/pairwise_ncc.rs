@@ -10,9 +10,9 @@ use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::thresholds::assessment::MIN_PIXEL_SHARE;
-use crate::thresholds::pairwise_lucas_kanade::{LEVEL, STRIDE_PX};
 use crate::thresholds::pairwise_ncc::{
-    COARSE_WINDOW_PX, FINE_WINDOW_PX, MIN_CORRELATION, MIN_SHARE_WITHOUT_OUTLIERS,
+    COARSE_WINDOW_PX, FINE_LEVEL, FINE_WINDOW_PX, MIN_CORRELATION, MIN_SHARE_WITHOUT_OUTLIERS,
+    STRIDE_PX,
 };
 use crate::tiles::residual_weighting::robust_correlation;
 use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
@@ -70,7 +70,7 @@ pub fn compute_pairwise_ncc(
         with_outliers: true,
     };
     let fine = Comparison {
-        level: LEVEL.min(level),
+        level: FINE_LEVEL.min(level),
         window_px: FINE_WINDOW_PX,
         with_outliers: true,
     };

@@ -15,13 +15,9 @@ use crate::thresholds::assessment::MAX_PAIR_ITERATIONS;
 use crate::thresholds::repair::MAX_ITERATIONS;
 use crate::tracking::track::register_rejected;
 use crate::validation::aliasing::{AliasHypothesis, resolve_aliases, resolve_all_aliases};
-use crate::validation::alignment::Alignment;
-use crate::validation::contradictions::find_contradictions;
-use crate::validation::inconsistent_frames::{
-    find_inconsistent_frames, reject_disagreeing_frames, relation_ties,
-};
-use crate::validation::pairwise_lucas_kanade::align_pairs;
-use crate::validation::pairwise_ncc::compute_pairwise_ncc;
+use crate::validation::disagreement::reject_disagreeing_frames;
+use crate::validation::inconsistent_frames::{find_inconsistent_frames, known_relations};
+use crate::validation::pairwise_ncc::{PairNcc, compute_pairwise_ncc};
 use std::ops::Range;
 use tunnelstitch_core::progress::Progress;
 
@@ -43,18 +39,18 @@ pub fn repair(
     let count = states.estimates.len();
     let finest = options.handover_level(context.cameras.shorter_side());
     progress.start("repair", MAX_ITERATIONS);
-    let mut alignments = align_pairs(context, finest, states, &(0..count))?;
-    let ties = relation_ties(context);
+    let mut pairs = compute_pairwise_ncc(context, finest, states, &(0..count))?;
+    let relations = known_relations(context);
     let mut best: Option<FrameStates> = None;
     // Known for the present poses only.
     let mut undecided = None;
     for iteration in 0..MAX_ITERATIONS {
-        alignments.retain(|pair| {
+        pairs.retain(|pair| {
             [pair.a, pair.b]
                 .iter()
                 .all(|k| states.rejections[*k].is_none())
         });
-        states.reject(find_inconsistent_frames(&alignments, &ties, count, options));
+        states.reject(find_inconsistent_frames(&pairs, &relations, count));
         let has_changed = !changes(&solved, states).is_empty();
         let is_better = |best: &FrameStates| count_inliers(best) < count_inliers(states);
         if !has_changed && best.as_ref().is_none_or(is_better) {
@@ -77,7 +73,7 @@ pub fn repair(
         }
         let neighbourhoods = Neighbourhood::of_changes(context, &solved, states)?;
         solve_neighbourhoods(context, options, &neighbourhoods, states, &mut solved)?;
-        align_again(context, finest, &neighbourhoods, states, &mut alignments)?;
+        compare_again(context, finest, &neighbourhoods, states, &mut pairs)?;
         progress.advance(1);
     }
     progress.finish();
@@ -93,8 +89,7 @@ pub fn repair(
 }
 
 /// Solves neighbourhoods from the coarsest level to full size, and rejects their frames that
-/// disagree with the others or contradict them. `solved` is set to the frames as these solves leave
-/// them.
+/// disagree with the others. `solved` is set to the frames as these solves leave them.
 fn solve_neighbourhoods(
     context: &EstimationContext,
     options: &RefineOptions,
@@ -102,9 +97,7 @@ fn solve_neighbourhoods(
     states: &mut FrameStates,
     solved: &mut FrameStates,
 ) -> Result<(), ProblemError> {
-    let side = context.cameras.shorter_side();
-    let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
-    let count = states.estimates.len();
+    let coarsest = options.coarsest_level(context.cameras.shorter_side());
     let mut shares = Vec::new();
     for neighbourhood in neighbourhoods {
         shares.push(neighbourhood.solve(context, options, 0..=coarsest, states)?);
@@ -114,23 +107,16 @@ fn solve_neighbourhoods(
         let rejections = &mut states.rejections[neighbourhood.active.clone()];
         reject_disagreeing_frames(shares, rejections);
     }
-    for neighbourhood in neighbourhoods {
-        let pairs = compute_pairwise_ncc(context, finest, states, &neighbourhood.participants)?;
-        let mut found = find_contradictions(&pairs, count);
-        // Frames that were held lack some of their pairs.
-        found.retain(|(frame, _)| neighbourhood.active.contains(frame));
-        states.reject(found);
-    }
     Ok(())
 }
 
-/// Replaces the alignments that the solve of neighbourhoods has changed.
-fn align_again(
+/// Replaces the pairs that the solve of neighbourhoods has changed.
+fn compare_again(
     context: &EstimationContext,
     finest: usize,
     neighbourhoods: &[Neighbourhood],
     states: &FrameStates,
-    alignments: &mut Vec<Alignment>,
+    pairs: &mut Vec<PairNcc>,
 ) -> Result<(), ProblemError> {
     for Neighbourhood {
         active,
@@ -138,11 +124,11 @@ fn align_again(
     } in neighbourhoods
     {
         let within =
-            |frames: &Range<usize>, pair: &Alignment| [pair.a, pair.b].map(|k| frames.contains(&k));
-        alignments.retain(|pair| {
+            |frames: &Range<usize>, pair: &PairNcc| [pair.a, pair.b].map(|k| frames.contains(&k));
+        pairs.retain(|pair| {
             within(participants, pair) != [true; 2] && within(active, pair) == [false; 2]
         });
-        alignments.extend(align_pairs(context, finest, states, participants)?);
+        pairs.extend(compute_pairwise_ncc(context, finest, states, participants)?);
     }
     Ok(())
 }

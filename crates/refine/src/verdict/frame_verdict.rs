@@ -10,7 +10,7 @@ use crate::options::RefineOptions;
 use crate::problem::linearisation::FrameContribution;
 use crate::thresholds::assessment::MIN_PIXEL_SHARE;
 use crate::uncertainty::frame_sigma::FrameSigma;
-use crate::validation::inconsistent_frames::find_disagreement;
+use crate::validation::disagreement::find_disagreement;
 
 /// The evidence about a frame at the end of the last solve.
 #[derive(Clone, Debug)]
