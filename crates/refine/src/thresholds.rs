@@ -44,7 +44,7 @@ pub mod wall_points {
     pub const MAX_OFF_WALL_SHARE: f64 = 0.25;
 }
 
-/// Thresholds of `tracking/*.rs`, and of `solver/neighbourhood.rs`.
+/// Thresholds of `tracking/*.rs`.
 pub mod tracking {
     /// Number of frames in a long window, and of those around a changed frame that are solved
     /// again.
@@ -382,6 +382,13 @@ pub mod aliasing {
     ///
     /// Chosen by: unknown.
     pub const MAX_PERIOD_DIFFERENCE: f64 = 0.1;
+
+    /// Number of times that frames with aliases are moved at the most.
+    ///
+    /// Higher: fewer frames remain undecided, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_ITERATIONS: usize = 8;
 }
 
 /// Thresholds of `samples/hidden_bands.rs`.
@@ -401,16 +408,6 @@ pub mod hidden_bands {
     /// Chosen by: without any band the share is some hundredths, up to a half in pictures along the
     /// tunnel; at a mirror's edge a seventh, within it 0.7 to 1.
     pub const HIDDEN_SHARES: [f64; 2] = [0.1, 0.7];
-}
-
-/// Thresholds of `validation/repair.rs`.
-pub mod repair {
-    /// Number of iterations in which frames are rejected and their neighbourhoods solved.
-    ///
-    /// Higher: longer repairs, fewer wrong frames left.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_ITERATIONS: usize = 8;
 }
 
 /// Thresholds of `uncertainty/observability.rs` and `uncertainty/solution_uncertainty.rs`.

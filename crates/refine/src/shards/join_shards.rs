@@ -157,7 +157,6 @@ fn joined_snapshot(
     let (shape, unseen) = joined_wall(setup, ended, &state)?;
     (state.shape, state.unseen) = (shape, unseen);
     setup.replace_kappa(&mut state, kappa);
-    state.solved = state.frames.clone();
     state.frames.reject(frames.displaced.clone());
     let lights: Vec<&Light> = ended
         .iter()
@@ -186,14 +185,14 @@ fn joined_snapshot(
 }
 
 /// The stages that are over and those that are left: from the last solve on, and before it the
-/// repair, if frames have been `displaced`.
+/// comparison of pairs, which registers rejected frames again, if some have been `displaced`.
 fn stages_left(stages: &VecDeque<Stage>, displaced: bool) -> (Vec<Stage>, VecDeque<Stage>) {
     let last = stages.iter().position(Stage::is_last_solve);
     let mut over: Vec<Stage> = stages.iter().copied().collect();
     let left = over.split_off(last.unwrap_or(over.len()));
-    let repair = displaced.then_some(Stage::Repair);
-    over.retain(|stage| Some(*stage) != repair);
-    (over, repair.into_iter().chain(left).collect())
+    let validate = displaced.then_some(Stage::ValidatePairs);
+    over.retain(|stage| Some(*stage) != validate);
+    (over, validate.into_iter().chain(left).collect())
 }
 
 /// The wall's shape, and the errors by what is not seen of it; `state`: with the frames of all in

@@ -6,7 +6,7 @@
 //!                                               Refined <─ last solve, assessment <─ join_shards
 //! ```
 //!
-//! Everything that makes up the search for the poses (tracking, checks, first solve, repair) needs
+//! Everything that makes up the search for the poses (tracking, checks, first solve, aliases) needs
 //! a frame's neighbours only. So each stretch is a survey of its own, with frames of its neighbours
 //! at its ends, and goes through the stages of any refinement as far as the last solve. Neighbours
 //! have placed the frames that they share twice: that gives the motion along the gauge and the

@@ -21,7 +21,6 @@ pub fn begin(setup: &Setup) -> PipelineState {
         has_common_light: true,
         is_lamp_ruled_out: false,
         dispersion: 1.0,
-        solved: frames.clone(),
         frames,
         kappa: Kappa::zeros(),
         free: setup.calibration.free,

@@ -18,7 +18,6 @@ pub fn run<'a>(
     let state = &mut estimation.state;
     let context = setup.context(state);
     correct_until_settled(&context, setup.options, &mut state.frames)?;
-    state.solved = state.frames.clone();
     session.record_time("shading");
     Ok(estimation)
 }

@@ -19,7 +19,7 @@ pub mod correct_shading;
 pub mod placement;
 pub mod plan;
 pub mod prescreen;
-pub mod repair;
+pub mod resolve_aliases;
 pub mod run;
 pub mod session;
 pub mod setup;

@@ -28,9 +28,9 @@ pub enum Stage {
     /// Rejects frames that contradict the others pair by pair
     /// ([`crate::stages::validate_pairs`]).
     ValidatePairs,
-    /// Rejects inconsistent frames, registers them again, resolves aliases
-    /// ([`crate::stages::repair`]).
-    Repair,
+    /// Moves frames to where the prior has them if they fit there as well
+    /// ([`crate::stages::resolve_aliases`]).
+    ResolveAliases,
     /// States uncertainty and verdict of every frame ([`crate::stages::assess`]).
     Assess,
 }
@@ -43,8 +43,8 @@ impl Stage {
     }
 }
 
-/// The stages of a refinement: track coarsely, check, solve at full size, repair, solve with denser
-/// samples, assess.
+/// The stages of a refinement: track coarsely, check, solve at full size, resolve aliases, solve
+/// with denser samples, assess.
 pub fn plan_stages(options: &RefineOptions) -> VecDeque<Stage> {
     let mut stages = VecDeque::from([
         Stage::Prescreen,
@@ -52,7 +52,7 @@ pub fn plan_stages(options: &RefineOptions) -> VecDeque<Stage> {
         Stage::CorrectShading,
         Stage::ValidatePairs,
         Stage::Solve(SolvePlan::first(options)),
-        Stage::Repair,
+        Stage::ResolveAliases,
         Stage::Solve(SolvePlan::last(options)),
     ]);
     if options.joint {

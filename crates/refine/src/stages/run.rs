@@ -5,7 +5,9 @@ use crate::stages::plan::Stage;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
-use crate::stages::{assess, correct_shading, prescreen, repair, solve, track, validate_pairs};
+use crate::stages::{
+    assess, correct_shading, prescreen, resolve_aliases, solve, track, validate_pairs,
+};
 
 /// Runs a stage: it takes the estimation as the stage before has left it and returns it changed.
 ///
@@ -23,7 +25,7 @@ pub fn run_stage<'a>(
         Stage::CorrectShading => correct_shading::run(setup, estimation, session),
         Stage::Solve(plan) => solve::run(plan, setup, estimation, session),
         Stage::ValidatePairs => validate_pairs::run(setup, estimation, session),
-        Stage::Repair => repair::run(setup, estimation, session),
+        Stage::ResolveAliases => resolve_aliases::run(setup, estimation, session),
         Stage::Assess => assess::run(setup, estimation, session),
     }
 }

@@ -9,7 +9,7 @@ use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::hidden_bands::find_hidden_bands;
 use crate::solver::argmin_glue::{self, Observation};
 use crate::solver::gauss_newton::{Solution, SolveState};
-use crate::solver::neighbourhood::Neighbourhood;
+use crate::solver::solve_levels::solve_levels;
 use crate::stages::plan::{SolvePlan, Stage};
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
@@ -73,7 +73,6 @@ pub fn run<'a>(
         plan_again(&plan, setup.options, state);
     }
     state.unobservable.extend(unobservable);
-    state.solved.clone_from(&state.frames);
     reject_disagreeing_frames(&solution.linearisation.frames, &mut state.frames.rejections);
     state.levels.push(GlobalSolve {
         samples_per_pixel: plan.sampling.density,
@@ -186,8 +185,7 @@ fn correct_light(
         }
         let context = setup.context(state);
         let levels = setup.handover_level()..=setup.coarsest_level();
-        let all = Neighbourhood::of_all(&state.frames);
-        all.solve(&context, setup.options, levels, &mut state.frames)?;
+        solve_levels(&context, setup.options, levels, &mut state.frames)?;
         plan_again(plan, setup.options, state);
     } else if light.is_some() {
         correct_once(context, setup.options, &state.frames)?;

@@ -34,8 +34,6 @@ pub struct PipelineState {
     pub dispersion: f64,
     /// The frames: estimates (none before they are tracked) and rejection reasons.
     pub frames: FrameStates,
-    /// The frames as the last solve left them; repair looks at what has changed since.
-    pub solved: FrameStates,
     /// The shared parameters κ, ...
     pub kappa: Kappa,
     /// ... and which of them are still estimated.

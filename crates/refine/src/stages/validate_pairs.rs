@@ -2,7 +2,7 @@
 //! blurred, registers rejected ones again, and solves.
 
 use crate::error::RefineError;
-use crate::solver::neighbourhood::Neighbourhood;
+use crate::solver::solve_levels::solve_levels;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
@@ -37,7 +37,7 @@ pub fn run<'a>(
         {
             break;
         }
-        Neighbourhood::of_all(frames).solve(&context, options, finest..=coarsest, frames)?;
+        solve_levels(&context, options, finest..=coarsest, frames)?;
         session.progress.advance(1);
     }
     session.progress.finish();

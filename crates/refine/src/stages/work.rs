@@ -21,8 +21,8 @@ const LAST_SOLVE_PER_PIXEL_S: f64 = 0.6e-6;
 const JOINT_SOLVE_PER_PIXEL_S: f64 = 15e-6;
 /// Time of comparing pairs.
 const VALIDATE_PAIRS_S: f64 = 0.012;
-/// Time of registering rejected frames again.
-const REPAIR_S: f64 = 0.015;
+/// Time of searching for aliases.
+const RESOLVE_ALIASES_S: f64 = 0.015;
 /// Time of uncertainty and verdict.
 const ASSESS_S: f64 = 0.005;
 
@@ -36,7 +36,7 @@ fn work_s(stage: &Stage, pixels: f64) -> f64 {
         Stage::Solve(plan) if plan.sampling.variance_weighting => LAST_SOLVE_PER_PIXEL_S * pixels,
         Stage::Solve(_) => FIRST_SOLVE_S,
         Stage::ValidatePairs => VALIDATE_PAIRS_S,
-        Stage::Repair => REPAIR_S,
+        Stage::ResolveAliases => RESOLVE_ALIASES_S,
         Stage::Assess => ASSESS_S,
     }
 }

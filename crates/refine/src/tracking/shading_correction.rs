@@ -15,7 +15,7 @@ use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
-use crate::solver::neighbourhood::Neighbourhood;
+use crate::solver::solve_levels::solve_levels;
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::light_model::LightModel;
 use crate::tracking::tile_views::TileViews;
@@ -49,7 +49,7 @@ pub fn correct_until_settled(
         if !correct(context, &views, frames, false) {
             break;
         }
-        Neighbourhood::of_all(frames).solve(context, options, finest..=coarsest, frames)?;
+        solve_levels(context, options, finest..=coarsest, frames)?;
     }
     Ok(observed)
 }

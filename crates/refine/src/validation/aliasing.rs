@@ -13,7 +13,7 @@ use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::samples::footprints::footprints;
-use crate::thresholds::repair::MAX_ITERATIONS;
+use crate::thresholds::aliasing::MAX_ITERATIONS;
 use crate::validation::alias_choice::{Evidence, find_periods};
 use crate::validation::alias_search::find_alias_motions;
 use std::collections::BTreeMap;

@@ -1,9 +1,9 @@
 //! Validation: frames are compared pair by pair, those that the others do not support are rejected,
-//! and the trajectory is repaired.
+//! and those that fit at several places are moved to where the prior has them.
 //!
 //! ```text
-//! overlaps ── pairwise_ncc → inconsistent_frames, blurred_frames ─┬→ repair
-//!             alias_search → alias_choice → aliasing ─────────────┘
+//! overlaps → pairwise_ncc → inconsistent_frames, blurred_frames
+//! alias_search → alias_choice → aliasing
 //! ```
 //!
 //! Normalised cross-correlation tells whether two frames show the same wall. On repetitive walls it
@@ -17,4 +17,3 @@ pub mod disagreement;
 pub mod inconsistent_frames;
 pub mod overlaps;
 pub mod pairwise_ncc;
-pub mod repair;

@@ -1,5 +1,5 @@
-//! Stage: repairs the trajectory where frames do not support each other, and rejects those with an
-//! alias that the prior does not exclude: the last solve must not rest on them.
+//! Stage: moves frames to where the prior has them if they fit there as well, and rejects those
+//! with an alias that the prior does not exclude: the last solve must not rest on them.
 
 use crate::error::RefineError;
 use crate::model::rejection::RejectionReason;
@@ -7,7 +7,7 @@ use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
 use crate::tracking::pose_separation::separation_m;
-use crate::validation::repair;
+use crate::validation::aliasing::resolve_all_aliases;
 
 /// Runs the stage on frames that have been solved at full size; without such a solve it does
 /// nothing.
@@ -24,13 +24,7 @@ pub fn run<'a>(
         return Ok(estimation);
     }
     let context = setup.context(state);
-    let aliases = repair::repair(
-        &context,
-        setup.options,
-        &mut state.frames,
-        state.solved.clone(),
-        session.progress.as_ref(),
-    )?;
+    let aliases = resolve_all_aliases(&context, setup.options, &mut state.frames)?;
     for (frame, motion) in aliases {
         let pose = &state.frames.estimates[frame].pose;
         let other = motion.apply(pose);
@@ -46,6 +40,6 @@ pub fn run<'a>(
         };
         state.frames.rejections[frame].get_or_insert(ambiguous);
     }
-    session.record_time("repair");
+    session.record_time("aliases");
     Ok(estimation)
 }
