@@ -170,7 +170,7 @@ impl fmt::Display for RejectionReason {
             Self::NotTried { failures } => write!(
                 f,
                 "it was not tried: {failures} frames from the beginning were searched for over \
-                 3.5 σ of the prior in all directions, and none matched the others as right ones do"
+                 3.5 σ of the prior in all directions, and most do not show the same wall"
             ),
             Self::Minority { frames: 1, .. } => write!(f, "it fits no other frame"),
             Self::Minority { frames, shown } => write!(

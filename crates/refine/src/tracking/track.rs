@@ -22,6 +22,8 @@ use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::{PosePrediction, predict_pose};
 use crate::tracking::registration::{Effort, Registered, register_frame};
 use crate::tracking::windows::{LONG_WINDOW_STRIDE, solve_long_window, solve_sliding_window};
+use crate::validation::inconsistent_frames::find_contradictions;
+use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::surface::Footprint;
 
@@ -44,6 +46,8 @@ pub struct Tracking {
     attempts: usize,
     /// Those of them that matched as well as right poses do.
     matches: usize,
+    /// True if most of the first frames do not show the same wall.
+    is_hopeless: bool,
     /// The effort that is left for registrations.
     effort: Effort,
     /// Frames tracked since the last sliding window.
@@ -66,6 +70,7 @@ impl Tracking {
             kappa,
             attempts: 0,
             matches: 0,
+            is_hopeless: false,
             effort: Effort::default(),
             frames_since_window: 0,
             was_reliable: true,
@@ -77,9 +82,10 @@ impl Tracking {
         self.states.estimates.len()
     }
 
-    /// True if so many frames did not match, and none did, that no others will.
+    /// True if so many frames did not match, and do not show the same wall where they fitted, that
+    /// no others will.
     pub fn is_hopeless(&self) -> bool {
-        self.matches == 0 && self.attempts >= MAX_FAILURES
+        self.is_hopeless
     }
 
     /// True if all frames are tracked.
@@ -109,11 +115,11 @@ impl Tracking {
         context: &EstimationContext,
         options: &RefineOptions,
     ) -> Result<(), ProblemError> {
-        let k = self.tracked_frames();
+        let (k, attempts) = (self.tracked_frames(), self.attempts);
         let context = &context.at(self.kappa).at(self.states.kappa);
         self.kappa = context.kappa;
         let predicted = predict_pose(context, k, &self.states);
-        if self.is_hopeless() {
+        if self.is_hopeless {
             let reason = RejectionReason::NotTried {
                 failures: self.attempts,
             };
@@ -132,7 +138,25 @@ impl Tracking {
         self.solve_windows(context, options, first, is_reliable)?;
         let pose = &self.states.estimates[k].pose;
         self.footprints[k] = footprint(context, context.cameras.of(k), k, pose)?;
+        if attempts < MAX_FAILURES && self.attempts == MAX_FAILURES && self.matches == 0 {
+            self.is_hopeless = !self.shows_one_wall(context, options)?;
+        }
         Ok(())
+    }
+
+    /// True if most of the frames tracked so far show the same wall, pair by pair. In light that is
+    /// not as modelled they do, though none matches as right ones should.
+    fn shows_one_wall(
+        &self,
+        context: &EstimationContext,
+        options: &RefineOptions,
+    ) -> Result<bool, ProblemError> {
+        let mut states = self.tracked_states();
+        let count = states.estimates.len();
+        let level = options.handover_level(context.cameras.shorter_side());
+        let pairs = compute_pairwise_ncc(context, level, &states, &(0..count))?;
+        states.reject(find_contradictions(&pairs, count));
+        Ok(states.has_majority())
     }
 
     /// Solves the windows that end with the last frame, if they are due; `first`: the first frame
