@@ -42,7 +42,7 @@ pub(super) fn detect_format(
     let words = row::words(line).map_err(|what| PoseError::line(path, number, what))?;
     let numbers = words
         .iter()
-        .filter(|word| word.parse::<f64>().is_ok())
+        .filter(|word| text::float(word).is_some())
         .count();
     match (numbers, words.len()) {
         // A line of a wrong length is reported by the parser of the nearest format.

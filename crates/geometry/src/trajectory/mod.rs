@@ -47,6 +47,7 @@ mod error;
 mod euroc;
 mod format;
 pub mod gyro;
+mod iso_time;
 mod jitter;
 pub mod kitti;
 mod meshroom;

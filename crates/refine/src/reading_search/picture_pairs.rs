@@ -16,7 +16,7 @@ use tunnelstitch_core::frames::{FrameCache, FrameSet, Light, PictureOrientation,
 use tunnelstitch_core::progress::Silent;
 use tunnelstitch_core::survey::{PoseReading, Survey};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-use tunnelstitch_geometry::trajectory::StampedPose;
+use tunnelstitch_geometry::trajectory::{Jitter, StampedPose};
 
 /// The pictures of pairs of neighbouring frames.
 pub struct PicturePairs<'s> {
@@ -89,9 +89,13 @@ impl<'s> PicturePairs<'s> {
         };
         let rejections = turned.prescreened.rejections.clone();
         let states = FrameStates::at(&setup.prior.initial, rejections);
+        // The density of a wider prior of positions is lower by its volume. That of a narrower one
+        // is no evidence: pictures may not tell positions better than it does.
+        let density_nats = 3.0 * reading.position_scale.ln().max(0.0);
+        let is_wanted = |some: &[Option<Registered>]| is_wanted(&rarer(some, density_nats));
         let registered = register_pairs(&context, &options, &states, &self.firsts, is_wanted)?;
         self.turned = Some(turned);
-        Ok(registered)
+        Ok(rarer(&registered, density_nats))
     }
 
     /// The pictures as a reading turns them.
@@ -126,15 +130,31 @@ impl<'s> PicturePairs<'s> {
         initial: &'a [StampedPose],
         options: &'a RefineOptions,
     ) -> Result<Setup<'a>, RefineError> {
+        let given = self.survey.prior;
         let input = RefineInput {
             cameras: reading.camera(self.survey.cameras.of(0)).into(),
             frames,
             initial,
+            prior: Jitter {
+                translation_sigma_m: given
+                    .translation_sigma_m
+                    .map(|sigma_m| reading.position_scale * sigma_m),
+                ..given
+            },
             pose_gaps: &[],
             ..RefineInput::from(self.survey)
         };
         Setup::new(input, options)
     }
+}
+
+/// Registrations whose prior has a density that is lower by so many nats.
+fn rarer(registered: &[Option<Registered>], nats: f64) -> Registrations {
+    let rarer = |found: Registered| Registered {
+        deviation: found.deviation + nats,
+        ..found
+    };
+    registered.iter().map(|found| found.map(rarer)).collect()
 }
 
 /// The frames of pairs, each once and in their order.
