@@ -16,6 +16,7 @@ use tunnelstitch_core::frames::{FrameCache, FrameSet, Light, PictureOrientation,
 use tunnelstitch_core::progress::Silent;
 use tunnelstitch_core::survey::{PoseReading, Survey};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::mean_radius_m;
 use tunnelstitch_geometry::trajectory::{Jitter, StampedPose};
 
 /// The pictures of pairs of neighbouring frames.
@@ -89,13 +90,24 @@ impl<'s> PicturePairs<'s> {
         };
         let rejections = turned.prescreened.rejections.clone();
         let states = FrameStates::at(&setup.prior.initial, rejections);
-        // The density of a wider prior of positions is lower by its volume. That of a narrower one
-        // is no evidence: pictures may not tell positions better than it does.
-        let density_nats = 3.0 * reading.position_scale.ln().max(0.0);
+        let density_nats = self.density_nats(reading, &options);
         let is_wanted = |some: &[Option<Registered>]| is_wanted(&rarer(some, density_nats));
         let registered = register_pairs(&context, &options, &states, &self.firsts, is_wanted)?;
         self.turned = Some(turned);
         Ok(rarer(&registered, density_nats))
+    }
+
+    /// Nats by which the density of a registered position is lower in a reading than as given,
+    /// because its prior is wider: `Σ ½ ln((s²σᵢ² + p²) / (σᵢ² + p²))`, `s` the reading's scale of
+    /// positions, σᵢ their 1-σ as given, and p that to which pictures tell them.
+    fn density_nats(&self, reading: &PoseReading, options: &RefineOptions) -> f64 {
+        let range_m = mean_radius_m(self.survey.surface.as_ref());
+        let pictures_m = options.max_sigma_px * range_m / self.survey.cameras.of(0).fx;
+        let variance = |sigma_m: f64| sigma_m.powi(2) + pictures_m.powi(2);
+        let sigmas_m = self.survey.prior.translation_sigma_m.into_iter();
+        let ratios =
+            sigmas_m.map(|sigma_m| variance(reading.position_scale * sigma_m) / variance(sigma_m));
+        0.5 * ratios.map(f64::ln).sum::<f64>()
     }
 
     /// The pictures as a reading turns them.
