@@ -189,6 +189,28 @@ fn clocks_of_other_zones_are_told_and_mended() {
     assert!(succeed(&convert).starts_with("1700007200 "));
 }
 
+/// A table whose column `frame` counts them.
+#[test]
+fn counters_in_the_column_of_names_are_the_order_of_frames() {
+    let survey = first_frames(4);
+    let dir = survey.path();
+    let toml = dir.join("survey.toml");
+    let convert = ["convert", text(dir), "--to", "kitti", "--out", "-"];
+    let given = succeed(&convert);
+    let poses = std::fs::read_to_string(dir.join("baseline.tum")).unwrap();
+    edit(&toml, "baseline.tum", "poses.csv");
+    for first in [0, 1] {
+        let row = |(k, line): (usize, &str)| {
+            let (_, pose) = line.split_once(' ').unwrap();
+            format!("{},{}\n", first + k, pose.replace(' ', ","))
+        };
+        let rows: String = poses.lines().enumerate().map(row).collect();
+        let table = format!("frame,tx,ty,tz,qx,qy,qz,qw\n{rows}");
+        std::fs::write(dir.join("poses.csv"), table).unwrap();
+        assert_eq!(succeed(&convert), given);
+    }
+}
+
 /// A body of ROS, whose x axis the camera looks along.
 #[test]
 fn bodies_of_robots_are_told_by_their_poses() {

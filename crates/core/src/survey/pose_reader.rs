@@ -111,7 +111,7 @@ impl<'a> PoseReader<'a> {
         } = self.frames;
         let default = match file.format {
             PoseFormat::Recording => Associate::Time,
-            _ if file.has_names() => Associate::Name,
+            _ if file.has_names() && !are_counters(&file, frames) => Associate::Name,
             _ => Associate::Order,
         };
         let (mut gaps, mut conflicts) = (Vec::new(), Vec::new());
@@ -256,6 +256,22 @@ impl PoseReader<'_> {
         };
         UnitSlip::find(as_given, frames, how, poses_in, frames_in)
     }
+}
+
+/// True if the names of a file number the frames from 0 or 1, and are not those of pictures.
+fn are_counters(file: &PoseFile, frames: &[FrameFile]) -> bool {
+    let names = file.entries.iter().map(|entry| entry.name.as_deref());
+    let numbers = names.map(|name| name?.parse::<usize>().ok());
+    let Some(numbers) = numbers.collect::<Option<Vec<usize>>>() else {
+        return false;
+    };
+    let counts = |start: usize| numbers.iter().copied().eq(start..start + frames.len());
+    let is_name = |frame: &FrameFile| {
+        let stem = frame.path.file_stem().unwrap_or_default().to_string_lossy();
+        let mut names = file.entries.iter().map(|entry| entry.name.as_deref());
+        names.any(|name| name == Some(&*stem))
+    };
+    (counts(0) || counts(1)) && !frames.iter().take(1).any(is_name)
 }
 
 /// The poses of all pictures of a rig, if the file has as many, or names them all.
