@@ -72,8 +72,9 @@ pub struct PoseReading {
     pub focal_factor: f64,
     /// Places by which the poses belong to later frames than given; earlier if it is negative.
     pub shift_frames: isize,
-    /// Factor of the positions and of their errors, in the tunnel of the given radius.
-    pub position_scale: f64,
+    /// Factor of the errors of positions, at most 1: wider ones would excuse what the prior as given
+    /// does not.
+    pub error_scale: f64,
 }
 
 impl PoseReading {
@@ -87,7 +88,7 @@ impl PoseReading {
             orientation: PictureOrientation::Stored,
             focal_factor: 1.0,
             shift_frames: 0,
-            position_scale: 1.0,
+            error_scale: 1.0,
         }
     }
 
@@ -202,7 +203,7 @@ impl Survey {
             let initial = self.initial.iter().map(scaled).collect();
             let reading = PoseReading {
                 prior_nats,
-                position_scale: 1.0 / factor,
+                error_scale: (1.0 / factor).min(1.0),
                 ..PoseReading::of_poses(remedy, 1, initial)
             };
             is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)

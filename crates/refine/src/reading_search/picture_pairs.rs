@@ -97,16 +97,16 @@ impl<'s> PicturePairs<'s> {
         Ok(rarer(&registered, density_nats))
     }
 
-    /// Nats by which the density of a registered position is lower in a reading than as given,
-    /// because its prior is wider: `Σ ½ ln((s²σᵢ² + p²) / (σᵢ² + p²))`, `s` the reading's scale of
-    /// positions, σᵢ their 1-σ as given, and p that to which pictures tell them.
+    /// Nats by which the density of a registered position is lower in a reading than as given;
+    /// negative, where its prior is narrower: `Σ ½ ln((s²σᵢ² + p²) / (σᵢ² + p²))`, `s` the
+    /// reading's scale of errors, σᵢ the 1-σ as given, and p that to which pictures tell positions.
     fn density_nats(&self, reading: &PoseReading, options: &RefineOptions) -> f64 {
         let range_m = mean_radius_m(self.survey.surface.as_ref());
         let pictures_m = options.max_sigma_px * range_m / self.survey.cameras.of(0).fx;
         let variance = |sigma_m: f64| sigma_m.powi(2) + pictures_m.powi(2);
         let sigmas_m = self.survey.prior.translation_sigma_m.into_iter();
         let ratios =
-            sigmas_m.map(|sigma_m| variance(reading.position_scale * sigma_m) / variance(sigma_m));
+            sigmas_m.map(|sigma_m| variance(reading.error_scale * sigma_m) / variance(sigma_m));
         0.5 * ratios.map(f64::ln).sum::<f64>()
     }
 
@@ -150,7 +150,7 @@ impl<'s> PicturePairs<'s> {
             prior: Jitter {
                 translation_sigma_m: given
                     .translation_sigma_m
-                    .map(|sigma_m| reading.position_scale * sigma_m),
+                    .map(|sigma_m| reading.error_scale * sigma_m),
                 ..given
             },
             pose_gaps: &[],
@@ -160,7 +160,7 @@ impl<'s> PicturePairs<'s> {
     }
 }
 
-/// Registrations whose prior has a density that is lower by so many nats.
+/// Registrations with a density that is lower by so many nats.
 fn rarer(registered: &[Option<Registered>], nats: f64) -> Registrations {
     let rarer = |found: Registered| Registered {
         deviation: found.deviation + nats,
