@@ -13,7 +13,9 @@ use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::Surface;
-use tunnelstitch_geometry::trajectory::{Pose, PoseFormat, StampedPose, Trajectory};
+use tunnelstitch_geometry::trajectory::{
+    CameraAxes, Convention, Pose, PoseFormat, StampedPose, Trajectory,
+};
 
 /// Units that positions may be given in instead of metres: their names, and their lengths, metres.
 const UNITS: [(&str, f64); 3] = [
@@ -72,8 +74,8 @@ pub struct PoseReading {
     pub focal_factor: f64,
     /// Places by which the poses belong to later frames than given; earlier if it is negative.
     pub shift_frames: isize,
-    /// Factor of the errors of positions, at most 1: wider ones would excuse what the prior as given
-    /// does not.
+    /// Factor of the errors of positions, at most 1: wider ones would excuse what the prior as
+    /// given does not.
     pub error_scale: f64,
 }
 
@@ -127,7 +129,12 @@ impl Survey {
             .read(&self.folder.join(&section.initial), section.missing_poses())?;
         let surface = self.surface.as_ref();
         let as_given = PoseReading::of_poses(String::new(), 0, self.initial.clone());
+        // A body of ROS sees what a camera sees whose pictures are turned by a quarter.
+        let is_ambiguous = |convention: &Convention| {
+            convention.axes == CameraAxes::Ros && self.has_turned_pictures()
+        };
         let conventions = feasible_conventions(surface, &given).into_iter();
+        let conventions = conventions.filter(|(_, convention)| !is_ambiguous(convention));
         let conventions = conventions.map(|(flags, convention)| {
             let initial = given.trajectory_in(&convention);
             PoseReading::of_poses(flags.join(" and "), flags.len(), initial)
@@ -158,6 +165,12 @@ impl Survey {
             .chain(pictures)
             .chain(lenses);
         Ok(std::iter::once(as_given.clone()).chain(others).collect())
+    }
+
+    /// True if pictures are turned as their EXIF data ask.
+    fn has_turned_pictures(&self) -> bool {
+        let mut readings = self.frames.iter().filter_map(|frame| frame.reading());
+        readings.any(|reading| reading.orientation == PictureOrientation::Exif)
     }
 
     /// Readings of another focal length than given, beyond those that refining searches by itself.

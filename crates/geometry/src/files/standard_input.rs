@@ -17,7 +17,7 @@ const NAME: &str = "standard input";
 /// The stream, from when a command names it.
 static STREAM: Mutex<Stream> = Mutex::new(Stream::Unnamed);
 
-/// What is known of the stream.
+/// The state of the stream.
 enum Stream {
     /// No command names it: a path like [`PATH`] in a file of others is a device.
     Unnamed,

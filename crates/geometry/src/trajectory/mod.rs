@@ -45,6 +45,7 @@ mod detection;
 mod entry_list;
 mod error;
 mod euroc;
+mod float;
 mod format;
 pub mod gyro;
 mod iso_time;

@@ -2,6 +2,7 @@
 
 use super::entry_list::{DuplicateTimes, EntryList, ParsedPoses};
 use super::error::PoseError;
+use super::float::float;
 use super::pose_entry::PoseEntry;
 use super::time_unit::TimeUnit;
 use super::times;
@@ -47,17 +48,6 @@ pub(super) fn stamped_lines(
             .map_err(|what| PoseError::line(path, number, what))?;
     }
     Ok(entries.into_parsed())
-}
-
-/// Parses a number, also with the sign of word processors (−) and with exponents of Fortran
-/// (`1D-3`).
-pub fn float(word: &str) -> Option<f64> {
-    let parsed = word.parse().ok();
-    parsed.or_else(|| {
-        let is_fortran = word.contains(|c: char| c.is_ascii_digit());
-        let exponent = |c: char| is_fortran && matches!(c, 'd' | 'D');
-        word.replace('−', "-").replace(exponent, "e").parse().ok()
-    })
 }
 
 /// Parses a finite number; `form` describes the line for the error message.

@@ -1,7 +1,8 @@
 //! Times in text: in a given unit, or in that which their digits tell; or dates.
 
+use super::float::float;
+use super::iso_time;
 use super::time_unit::TimeUnit;
-use super::{iso_time, text};
 
 /// Smallest number of digits of a whole number that is nanoseconds since 1970, or of a computer's
 /// start: no clock counts that many of another unit.
@@ -25,7 +26,7 @@ pub fn from_word(word: &str, unit: Option<TimeUnit>) -> Option<f64> {
     if let Some(unit) = unit {
         return unit.seconds(word);
     }
-    let Some(number) = text::float(word) else {
+    let Some(number) = float(word) else {
         return iso_time::seconds(word);
     };
     let is_time = number.is_finite() && number <= i64::MAX as f64;

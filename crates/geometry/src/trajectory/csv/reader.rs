@@ -181,7 +181,7 @@ mod tests {
         );
     }
 
-    /// What spreadsheets and loggers write beside plain numbers.
+    /// Thousands, decimal commas, empty cells and rows, blanks and dates.
     #[test]
     fn tables_of_spreadsheets_are_read() {
         let pose = "0.5,-1,1234.5,0,0,0,1";
