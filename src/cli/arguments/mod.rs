@@ -3,7 +3,7 @@
 //! | file | arguments |
 //! | --- | --- |
 //! | `numbers` | parsers of numbers, sizes and lists |
-//! | [`input_file`] | parser of files to read |
+//! | `input_file` | parser of files to read |
 //! | [`poses`] | which poses are used, and how they are read |
 //! | [`tunnel`] | section and centreline |
 //! | [`frame_times`] | number and times of the frames |
