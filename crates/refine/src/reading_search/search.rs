@@ -229,3 +229,49 @@ fn name(mut found: Vec<Found>) -> Option<FittingReadings> {
         log_odds: best.log_odds,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tunnelstitch_core::frames::PictureOrientation;
+
+    /// A usual reading, or one that is improbable from the beginning.
+    fn reading(prior_nats: f64) -> PoseReading {
+        PoseReading {
+            remedy: format!("{prior_nats}"),
+            changes: 1,
+            prior_nats,
+            initial: Vec::new(),
+            orientation: PictureOrientation::Stored,
+            focal_factor: 1.0,
+            shift_frames: 0,
+            error_scale: 1.0,
+        }
+    }
+
+    fn found<'r>(reading: &'r PoseReading, pair_nats: &[f64]) -> Found<'r> {
+        Found {
+            reading,
+            fitting: pair_nats.len(),
+            given: 0,
+            pairs: pair_nats.len(),
+            log_odds: reading.prior_nats + pair_nats.iter().sum::<f64>(),
+            pair_nats: pair_nats.to_vec(),
+        }
+    }
+
+    /// Of equal sums, those whose pairs disagree do not tell readings apart.
+    #[test]
+    fn readings_are_told_apart_where_pairs_agree() {
+        let (usual, rare) = (reading(0.0), reading(-3.0));
+        let best = found(&usual, &[30.0; 8]);
+        let steady = found(&usual, &[29.0; 8]);
+        let mixed = found(&usual, &[24.0, 34.0, 25.0, 33.0, 26.0, 34.0, 24.0, 32.0]);
+        assert!(steady.is_told_from(&best) && !mixed.is_told_from(&best));
+        assert_eq!(steady.log_odds, mixed.log_odds);
+        // A reading that is improbable from the beginning needs more.
+        assert!(found(&rare, &mixed.pair_nats).is_told_from(&best));
+        // Within odds of one to twenty, nothing is told.
+        assert!(!found(&usual, &[29.8; 8]).is_told_from(&best));
+    }
+}
