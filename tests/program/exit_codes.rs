@@ -115,7 +115,7 @@ fn too_little_memory_is_temporary() {
             "--threads",
             "1",
         ];
-        let output = limited("ulimit -v 40000", &arguments, "");
+        let output = limited("ulimit -v 42000", &arguments, "");
         assert_code(&output, 75);
         let message = String::from_utf8_lossy(&output.stderr);
         assert!(message.contains("of memory"), "{message}");

@@ -116,7 +116,7 @@ fn what_is_left_aside_is_named_with_the_reason() {
         "camera2.json (480 × 360 px): one is enough",
         "no poses: line 1: in no known format\n",
         "short.tum: no poses: line 2: ",
-        "*.npy (2): by its name no file of a survey",
+        "*.npy (2): arrays of another program",
         "wall.laz: measured points: points = \"wall.laz\" under [tunnel]",
         "frame.json: a frame of reference: tunnel_frame = \"frame.json\" under [poses]",
         "a/b/c/d: not searched",

@@ -20,6 +20,7 @@ mod fuzzed;
 mod gis;
 mod gopro;
 mod gyro;
+mod habits;
 mod init;
 mod jobs;
 mod lenses;

@@ -1,5 +1,6 @@
 //! Arguments of a simulated wall as built, and of cables and lamps before it.
 
+use super::input_file::input_file;
 use crate::evaluate::converge::WallDeformation;
 use crate::simulate::{AsBuilt, Fittings, Segments, SimulateOptions};
 use std::path::PathBuf;
@@ -52,7 +53,7 @@ pub struct AsBuiltArguments {
     joint_mm: f64,
     /// A shape.json (of refine): the lining has its displacement. Straight round tunnels of its
     /// perimeter only.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input_file())]
     shape_file: Option<PathBuf>,
     /// Number of cables along the tunnel, 2 to 5 cm thick, on brackets 7 to 12 cm before the wall.
     /// Straight tunnels only.

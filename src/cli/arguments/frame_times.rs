@@ -1,5 +1,6 @@
 //! Arguments of the number and the times of frames.
 
+use super::input_file::input_file;
 use super::numbers::positive;
 use crate::cli::output::Failure;
 use crate::survey::{FrameTimes, UnposedFrames, read_frame_times, toml_path};
@@ -17,7 +18,7 @@ pub struct FrameTimesArguments {
     fps: Option<f64>,
     /// File with the times of the frames, one a line: `time`, `time name` or `name time`, in
     /// seconds or whole nanoseconds.
-    #[arg(long, value_name = "FILE", conflicts_with = "fps")]
+    #[arg(long, value_name = "FILE", conflicts_with = "fps", value_parser = input_file())]
     frame_times: Option<PathBuf>,
 }
 

@@ -3,6 +3,7 @@
 //! | file | arguments |
 //! | --- | --- |
 //! | `numbers` | parsers of numbers, sizes and lists |
+//! | `input_file` | parser of files to read |
 //! | [`poses`] | which poses are used, and how they are read |
 //! | [`tunnel`] | section and centreline |
 //! | [`frame_times`] | number and times of the frames |
@@ -18,6 +19,7 @@
 mod as_built;
 mod frame_times;
 mod imaging;
+mod input_file;
 mod motion;
 mod numbers;
 mod panorama_files;
@@ -31,6 +33,7 @@ mod tunnel;
 pub use as_built::{AsBuiltArguments, DeformationArguments};
 pub use frame_times::{FrameTimesArguments, clock_times};
 pub use imaging::ImagingArguments;
+pub use input_file::input_file;
 pub use motion::{MotionArguments, MountingArguments};
 pub use numbers::{memory_size, numbers, picture_size, positive, rate, share, view_angle};
 pub use panorama_files::OutputArguments;

@@ -1,6 +1,7 @@
 //! Arguments of the carrier's planned motion and of the camera's mounting.
 
 use super::frame_times::clock_times;
+use super::input_file::input_file;
 use super::numbers::numbers;
 use crate::cli::output::Failure;
 use crate::survey::FrameTimes;
@@ -23,6 +24,7 @@ pub struct MotionArguments {
     #[arg(
         long,
         value_name = "CSV",
+        value_parser = input_file(),
         conflicts_with_all = [
             "advance_m", "advance_m_per_s", "start_angle_deg", "start_chainage_m", "offset_m"
         ]

@@ -1,5 +1,6 @@
 //! Arguments of a panorama's files.
 
+use super::input_file::input_file;
 use crate::cli::output::{
     Failure, check_parent_folder, picture_format, record, refuse_overwriting, survey_files,
 };
@@ -34,7 +35,7 @@ pub struct OutputArguments {
     maps: Option<PathBuf>,
     /// The covariance.csv that refine writes beside the poses
     /// [default: the one in the folder of the file of --poses].
-    #[arg(long, value_name = "FILE", requires = "maps")]
+    #[arg(long, value_name = "FILE", requires = "maps", value_parser = input_file())]
     pub covariance: Option<PathBuf>,
     /// Compression of a .tif.
     #[arg(long, value_enum, default_value_t)]

@@ -1,5 +1,6 @@
 //! Arguments that select poses and say how they are read.
 
+use super::input_file::input_file;
 use crate::cli::output::{Failure, Terminal};
 use crate::report::REFINEMENT_FILE;
 use crate::survey::{Associate, PosesSection, SURVEY_FILE, Survey, SurveyError, SurveyFile};
@@ -36,25 +37,26 @@ pub struct PoseReadingArguments {
     /// [default: that of the format].
     #[arg(long, value_enum, value_name = "C2W|W2C")]
     pose_convention: Option<DirectionArgument>,
-    /// Axes of the camera: opencv (y down, z forward) or opengl (y up, z backwards)
+    /// Axes of the camera: opencv (y down, z forward), opengl (y up, z backwards), ros (z up, x
+    /// forward) or unity (y up, z forward, left-handed)
     /// [default: those of the format].
     #[arg(long, value_enum, value_name = "AXES")]
     camera_axes: Option<AxesArgument>,
     /// Extrinsics between the body (IMU) whose poses these are and the camera: a 4 × 4 matrix,
     /// EuRoC's sensor.yaml (T_BS), or a camchain of Kalibr (T_cam_imu).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input_file())]
     body_to_camera: Option<PathBuf>,
     /// Axis of the tunnel in the world frame of the poses: JSON {"point_m": [x, y, z], "axis":
     /// [x, y, z], "theta_zero": [x, y, z]} (the last is optional), or a 4 × 4 matrix from the
     /// tunnel's frame (y along the axis) to the world.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input_file())]
     tunnel_frame: Option<PathBuf>,
     /// Association of poses with frames [default: by name if the file has names, else by order].
     #[arg(long, value_enum, value_name = "HOW")]
     associate: Option<AssociateArgument>,
     /// File with the times of the frames, one a line: `time`, `time name` or `name time`, in
     /// seconds or whole nanoseconds [default: from the frames' names].
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input_file())]
     frame_times: Option<PathBuf>,
     /// With --associate time: largest time difference between a frame and its nearest pose, seconds
     /// [default: 0.01].
@@ -134,6 +136,10 @@ enum AxesArgument {
     Opencv,
     /// x right, y up, z backwards.
     Opengl,
+    /// x forward, y left, z up: a body of ROS.
+    Ros,
+    /// x right, y up, z forward, in a left-handed world.
+    Unity,
 }
 
 /// Names of associations.
@@ -190,6 +196,8 @@ impl From<AxesArgument> for CameraAxes {
         match axes {
             AxesArgument::Opencv => Self::OpenCv,
             AxesArgument::Opengl => Self::OpenGl,
+            AxesArgument::Ros => Self::Ros,
+            AxesArgument::Unity => Self::Unity,
         }
     }
 }
@@ -295,23 +303,29 @@ fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
+/// The poses that survey.toml names as initial ones.
+const INITIAL: &str = "initial";
+/// Its true poses.
+const TRUTH: &str = "truth";
+
 /// Poses that a command uses.
 #[derive(Clone, Debug, clap::Args)]
 pub struct PosesArguments {
     /// Poses to use: `initial` and `truth` are those of survey.toml; anything else is a file in any
     /// supported format, in the tunnel's frame as `refine` and `convert` write it, unless the flags
-    /// below say otherwise. With poses of `refine` come the camera and the shape of the wall that
-    /// it has found and written beside them.
+    /// below say otherwise; `-` is standard input. With poses of `refine` come the camera and the
+    /// shape of the wall that it has found and written beside them.
     #[arg(
         id = "poses",
         long = "poses",
         default_value = "initial",
-        value_name = "initial|truth|FILE"
+        value_name = "initial|truth|FILE",
+        value_parser = input_file()
     )]
-    name: String,
+    name: PathBuf,
     /// Shape of the wall, as `refine` writes it [default: that beside the poses, or that of
     /// survey.toml].
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input_file())]
     shape: Option<PathBuf>,
     #[command(flatten)]
     reading: PoseReadingArguments,
@@ -379,7 +393,7 @@ impl PosesArguments {
     /// Poses of a file that `refine` has written.
     pub fn from_file(file: &Path) -> Self {
         Self {
-            name: file.to_string_lossy().into_owned(),
+            name: file.to_owned(),
             shape: None,
             reading: PoseReadingArguments::default(),
         }
@@ -405,10 +419,10 @@ impl PosesArguments {
 
     /// The file, unless the poses are those of survey.toml.
     pub fn file(&self) -> Option<&Path> {
-        match self.name.as_str() {
-            "initial" | "truth" => None,
-            file => Some(Path::new(file)),
-        }
+        let is_of_survey = [INITIAL, TRUTH]
+            .iter()
+            .any(|word| self.name == Path::new(word));
+        (!is_of_survey).then_some(&*self.name)
     }
 
     /// Opens a survey and reads the chosen poses.
@@ -435,14 +449,14 @@ impl PosesArguments {
             self.reading.apply_to(file);
         })?;
         let survey = warned(opened, terminal);
-        let poses = match (self.name.as_str(), &survey.truth) {
-            ("truth", Some(truth)) => truth.clone(),
-            ("truth", None) => {
+        let poses = match (self.name == Path::new(TRUTH), &survey.truth) {
+            (true, Some(truth)) => truth.clone(),
+            (true, None) => {
                 return Err(Failure::usage(
                     "--poses truth: the survey has no poses.truth; use --poses initial or a file",
                 ));
             }
-            _ => survey.initial.clone(),
+            (false, _) => survey.initial.clone(),
         };
         Ok((survey, poses))
     }

@@ -1,5 +1,6 @@
 //! Arguments of a tunnel: section and centreline.
 
+use super::input_file::input_file;
 use super::numbers::positive;
 use crate::survey::{Shape, TunnelSection};
 use clap::ValueEnum;
@@ -21,7 +22,7 @@ pub struct TunnelArguments {
     #[arg(long, value_name = "M", value_parser = positive)]
     height_m: Option<f64>,
     /// File with the centreline of a curved tunnel, one point a line: `x y z [radius]`, metres.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input_file())]
     centreline: Option<PathBuf>,
 }
 

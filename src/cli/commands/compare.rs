@@ -1,6 +1,6 @@
 //! `tunnelstitch compare`: compares initial with refined poses.
 
-use crate::cli::arguments::{PictureArguments, PoseReadingArguments, positive};
+use crate::cli::arguments::{PictureArguments, PoseReadingArguments, input_file, positive};
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
@@ -34,8 +34,8 @@ pub struct CompareArguments {
     /// Folder that refine has written, or poses in any format, in the tunnel's frame as `refine`
     /// and `convert` write them. The flags for reading poses apply to those of the survey only;
     /// convert poses of another convention first. Camera and wall are those that `refine` has found
-    /// and written beside them, for all poses.
-    #[arg(long, value_name = "DIR|FILE")]
+    /// and written beside them, for all poses. `-` reads poses from standard input.
+    #[arg(long, value_name = "DIR|FILE", value_parser = input_file())]
     refined: PathBuf,
     /// Folder for the results; created if missing.
     #[arg(long, short, value_name = "DIR")]

@@ -1,7 +1,8 @@
 //! `tunnelstitch gyro`: computes initial poses from a gyroscope log.
 
 use crate::cli::arguments::{
-    FrameTimesArguments, MotionArguments, MountingArguments, clock_times, numbers, positive,
+    FrameTimesArguments, MotionArguments, MountingArguments, clock_times, input_file, numbers,
+    positive,
 };
 use crate::cli::output::{
     Failure, PosesReport, RunRecord, Suggestion, SuggestionArguments, Terminal,
@@ -42,7 +43,9 @@ use std::path::PathBuf;
     reads the gyro that a GoPro writes into its video"
 )]
 pub struct GyroArguments {
-    /// The log: Gyroflow's gcsv, or a video as a GoPro wrote it (MP4 with its track `gpmd`).
+    /// The log: Gyroflow's gcsv, or a video as a GoPro wrote it (MP4 with its track `gpmd`); `-`
+    /// is standard input.
+    #[arg(value_parser = input_file())]
     log: PathBuf,
     /// Folder of the survey whose frames get the poses, or its survey.toml. Its own poses need not
     /// exist yet.
@@ -110,7 +113,7 @@ struct SensorArguments {
     orientation: Option<String>,
     /// Extrinsics between the sensor's axes in the log and the camera, instead: a 4 × 4 matrix,
     /// EuRoC's sensor.yaml (T_BS), or a camchain of Kalibr (T_cam_imu).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input_file())]
     body_to_camera: Option<PathBuf>,
     /// Length of the interval at rest to search for, seconds.
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = positive)]

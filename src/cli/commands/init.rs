@@ -65,7 +65,8 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
     }
     atomic::write_text(&path, &found.survey_toml(arguments.radius_m))?;
     terminal.say(format!("wrote {}", printed(&path)));
-    for sentence in pictures_beside(&found).chain(unknown_scale(&found)) {
+    let sentences = pictures_beside(&found).chain(unknown_scale(&found));
+    for sentence in sentences.chain(faulty_calibrations(&found)) {
         terminal.warn(sentence);
     }
     let fault = found.picture_frames().and_then(|group| group.fault.clone());
@@ -156,6 +157,14 @@ fn unknown_scale(found: &Discovery) -> Option<String> {
 /// scale of their positions is unknown.
 fn missing(found: &Discovery, error: &SurveyError) -> String {
     match error {
+        SurveyError::Poses(PoseError::Read { .. })
+            if found.initial().is_none() && faulty_poses(found).is_some() =>
+        {
+            format!(
+                "there are no poses: {}",
+                faulty_poses(found).unwrap_or_default()
+            )
+        }
         SurveyError::Poses(PoseError::Read { .. }) if found.initial().is_none() => {
             "there are no poses; let tunnelstitch plan or tunnelstitch gyro make them, or name a \
              file by initial = \"…\" under [poses]"
@@ -168,6 +177,29 @@ fn missing(found: &Discovery, error: &SurveyError) -> String {
         }
         error => error.to_string(),
     }
+}
+
+/// The files that would hold the poses, but for a fault, with it.
+fn faulty_poses(found: &Discovery) -> Option<String> {
+    let aside = found.left_aside.iter();
+    let faulty = aside.filter(|aside| aside.is_faulty_pose_file());
+    let lines: Vec<String> = faulty
+        .map(|aside| format!("{} has {}", aside.pattern, aside.reason))
+        .collect();
+    (!lines.is_empty()).then(|| lines.join("; "))
+}
+
+/// The sentences about calibrations that cannot be used, if there is no other.
+fn faulty_calibrations(found: &Discovery) -> impl Iterator<Item = String> {
+    let is_guessed = found.calibrations.is_empty();
+    let aside = found.left_aside.iter().filter(move |_| is_guessed);
+    let faulty = aside.filter(|aside| aside.is_faulty_calibration());
+    faulty.map(|aside| {
+        format!(
+            "{} is not used, and a pinhole is guessed instead: {}",
+            aside.pattern, aside.reason
+        )
+    })
 }
 
 /// The parts that were found, for `--json`; paths are relative to the folder.
@@ -221,10 +253,8 @@ fn choose_frames(arguments: &InitArguments, found: &mut Discovery) -> Result<(),
 
 /// The error of a folder without pictures that are read, and without a video.
 fn no_frames(folder: &Path, found: &Discovery) -> Failure {
-    let unread = found
-        .left_aside
-        .iter()
-        .find(|aside| aside.is_unread_picture());
+    let mut aside = found.left_aside.iter();
+    let unread = aside.find(|aside| aside.is_unread_picture() || aside.is_archive());
     let unread = unread.map_or(String::new(), |aside| {
         format!("; {} ({}): {}", aside.pattern, aside.count, aside.reason)
     });

@@ -1,7 +1,7 @@
 //! `tunnelstitch locate`: converts a point between panorama, wall and frames; many points at once
 //! by [`locate_points`].
 
-use crate::cli::arguments::{CanvasArguments, PosesArguments};
+use crate::cli::arguments::{CanvasArguments, PosesArguments, input_file};
 use crate::cli::commands::locate_points::{find_frame, locate_points};
 use crate::cli::output::{Failure, Terminal, json};
 use crate::render::{
@@ -76,9 +76,15 @@ pub struct LocateArguments {
     frame: Option<FramePixel>,
     /// Many pixels: a CSV file with the columns frame (name of its file, or its index from 0), u
     /// and v. They are copied to --out with the columns theta_rad, h_m and range_m (distance from
-    /// the camera) added, empty where the frame shows no wall. `-` is
-    /// standard input.
-    #[arg(long, group = "point", value_name = "IN.csv", requires = "out")]
+    /// the camera) added, empty where the frame shows no wall. `-` is standard
+    /// input.
+    #[arg(
+        long,
+        group = "point",
+        value_name = "IN.csv",
+        requires = "out",
+        value_parser = input_file()
+    )]
     points: Option<PathBuf>,
     /// The file to write for --points; `-` is standard output.
     #[arg(long, short, value_name = "OUT.csv", requires = "points")]

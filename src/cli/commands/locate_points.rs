@@ -2,15 +2,13 @@
 //! writes.
 
 use crate::cli::output::{Failure, Terminal, is_stream, json, refuse_two_results};
-use crate::files::printed;
+use crate::files::{open_regular, printed};
 use crate::persist::atomic;
 use crate::render::{hit_of_pixel, place_frames};
 use crate::survey::Survey;
 use crate::trajectory::Pose;
 use csv::StringRecord;
 use serde::Serialize;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 /// Columns of the input.
@@ -35,13 +33,8 @@ pub fn locate_points(
     let surface = survey.surface.as_ref();
     let placements = place_frames(surface, &survey.cameras, poses, &survey.shutter())?;
     refuse_two_results(out, terminal)?;
-    let name = if is_stream(points) {
-        "standard input".to_owned()
-    } else {
-        printed(points).to_string()
-    };
-    let bad = |what: String| Failure::input(format!("{name}: {what}"));
-    let source = open_points(points).map_err(|error| bad(error.to_string()))?;
+    let bad = |what: String| Failure::input(format!("{}: {what}", printed(points)));
+    let source = open_regular(points).map_err(|error| bad(error.to_string()))?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_reader(source);
@@ -103,15 +96,6 @@ struct PointsReport<'a> {
     out: &'a Path,
     pixels: usize,
     on_wall: usize,
-}
-
-/// Opens the file of pixels, or standard input.
-fn open_points(points: &Path) -> std::io::Result<Box<dyn Read>> {
-    Ok(if is_stream(points) {
-        Box::new(std::io::stdin())
-    } else {
-        Box::new(File::open(points)?)
-    })
 }
 
 /// Finds the columns of the input among its headers; returns what is missing.

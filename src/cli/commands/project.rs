@@ -1,7 +1,7 @@
 //! `tunnelstitch project`: writes the cylindrical projection of one photo.
 
 use crate::camera::{Camera, read_calibration};
-use crate::cli::arguments::{InterpolationArgument, positive};
+use crate::cli::arguments::{InterpolationArgument, input_file, positive};
 use crate::cli::output::{Failure, RunRecord, Terminal, picture_format, record};
 use crate::files::printed;
 use crate::frames::{FrameFile, add_picture, load_colour, open_picture};
@@ -20,7 +20,8 @@ use std::path::{Path, PathBuf};
     after_help = "Example:\n  tunnelstitch project photo.jpg --fov-deg 60 --out cylinder.png"
 )]
 pub struct ProjectArguments {
-    /// The photo.
+    /// The photo; `-` is standard input.
+    #[arg(value_parser = input_file())]
     image: PathBuf,
     /// The result, .png or .tif.
     #[arg(long, short, value_name = "FILE")]
@@ -38,7 +39,7 @@ pub struct ProjectArguments {
     #[arg(long, value_name = "F", value_parser = positive, conflicts_with = "camera")]
     focal_px: Option<f64>,
     /// Calibration file of the camera, instead of --fov-deg.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input_file())]
     camera: Option<PathBuf>,
     /// Interpolation between the pixels of the photo.
     #[arg(long, value_enum, default_value_t)]

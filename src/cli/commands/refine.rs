@@ -3,7 +3,9 @@
 use crate::check::{
     JOIN_SHARE, join_bytes, refine_bytes, refine_s, shard_bytes, shard_share, unused_bits_warning,
 };
-use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
+use crate::cli::arguments::{
+    PoseReadingArguments, ResumeArguments, input_file, positive, rate, resume, share,
+};
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::commands::refine_files::{
     FOUND_FILES, REFINED_FILES, check_outputs, stage_refined,
@@ -72,10 +74,10 @@ pub struct RefineArguments {
     #[arg(long, value_name = "MODE", value_enum, default_value_t = PhotometryArgument::Auto)]
     photometry: PhotometryArgument,
     /// Points of the wall that a scanner or a depth camera has measured, in the world of the
-    /// initial poses, metres: .ply, .las, .laz, .pcd, or text with x y z in each line. The wall is
-    /// fitted to them, robustly: frames refine that shape (with --shape fixed, they take it as it
-    /// is). Instead of tunnel.points of survey.toml.
-    #[arg(long, value_name = "FILE")]
+    /// initial poses, metres: .ply, .las, .laz, .pcd, or text with x y z in each line, as from
+    /// standard input (`-`). The wall is fitted to them, robustly: frames refine that shape (with
+    /// --shape fixed, they take it as it is). Instead of tunnel.points of survey.toml.
+    #[arg(long, value_name = "FILE", value_parser = input_file())]
     points: Option<PathBuf>,
     /// Largest number of Gauss–Newton iterations of each global solve.
     #[arg(

@@ -3,7 +3,7 @@
 use crate::camera::{Camera, Lens, read_calibration};
 use crate::cli::arguments::{
     AsBuiltArguments, DegradationArguments, ImagingArguments, JitterArgument, TunnelArguments,
-    WallArgument, numbers, picture_size, positive, view_angle,
+    WallArgument, input_file, numbers, picture_size, positive, view_angle,
 };
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
@@ -84,7 +84,12 @@ pub struct SimulateArguments {
     tunnel: TunnelArguments,
     /// Calibration file of the camera, in any format and with any lens model that survey.toml
     /// accepts.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "fov_deg", "k1", "k2"])]
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["size", "fov_deg", "k1", "k2"],
+        value_parser = input_file()
+    )]
     camera: Option<PathBuf>,
     /// Number of cameras of a rig: each takes a frame at every moment, and --frames counts the
     /// moments. They are spread about the carrier's axis (with --view forward about the vertical of

@@ -6,7 +6,7 @@ use super::recorded_images::RecordedImages;
 use super::unmatched_pattern;
 use super::unread_format::UnreadFormat;
 use super::video::Video;
-use alphanumeric_sort::compare_path;
+use alphanumeric_sort::compare_str;
 use image::error::ImageFormatHint;
 use image::{DynamicImage, ImageError};
 use std::path::{Path, PathBuf};
@@ -275,8 +275,11 @@ pub fn list_frames(
             printed(&path)
         )));
     }
-    // Different names never count as equal.
-    paths.sort_by(|a, b| compare_path(a, b).then_with(|| a.cmp(b)));
+    // Cameras number on, whatever the capitals; different names never count as equal.
+    let lower = |path: &PathBuf| path.to_string_lossy().to_lowercase();
+    let mut paths: Vec<(String, PathBuf)> =
+        paths.into_iter().map(|path| (lower(&path), path)).collect();
+    paths.sort_by(|a, b| compare_str(&a.0, &b.0).then_with(|| a.1.cmp(&b.1)));
     if paths.is_empty() {
         return Err(FrameError::NoFrames {
             pattern: pattern.to_owned(),
@@ -286,7 +289,7 @@ pub fn list_frames(
     Ok(paths
         .into_iter()
         .enumerate()
-        .map(|(index, path)| FrameFile::picture(index, path))
+        .map(|(index, (_, path))| FrameFile::picture(index, path))
         .collect())
 }
 

@@ -145,10 +145,19 @@ impl UnreadFormat {
                 let command = format!("mogrify -format png {files}");
                 (command, "ImageMagick", "png")
             }
-            // Grey values between 0 and 1 become 0 to 65535.
-            Self::FloatTiff | Self::OpenExr => {
-                let command = format!("mogrify -depth 16 -format png {files}");
-                (command, "ImageMagick, for values from 0 to 1", "png")
+            // ImageMagick reads these from 0 to 1 only.
+            Self::FloatTiff => {
+                let each = "gdal_translate -q -ot UInt16 -scale 0 1 0 65535 -of PNG \"$f\" \
+                            \"${f%.*}.png\"";
+                let command = format!("for f in {files}; do {each}; done");
+                let program = "GDAL; instead of 0 1 the values that become black and white";
+                (command, program, "png")
+            }
+            Self::OpenExr => {
+                let each =
+                    "ffmpeg -v error -y -i \"$f\" -pix_fmt rgb48be \"${f%.*}.png\" < /dev/null";
+                let command = format!("for f in {files}; do {each}; done");
+                (command, "ffmpeg, for values from 0 to 1", "png")
             }
             Self::JpegXl => {
                 let each = "djxl \"$f\" \"${f%.*}.png\"";
@@ -280,6 +289,17 @@ mod tests {
         let remedy = UnreadFormat::Bmp.remedy(Path::new("my frames/1.BMP"));
         assert!(
             remedy.contains("`mogrify -format png 'my frames'/*.BMP`"),
+            "{remedy}"
+        );
+        let remedy = UnreadFormat::FloatTiff.remedy(Path::new("f/1.tif"));
+        assert!(
+            remedy.contains("for f in f/*.tif; do gdal_translate")
+                && remedy.contains("instead of 0 1"),
+            "{remedy}"
+        );
+        let remedy = UnreadFormat::OpenExr.remedy(Path::new("1.exr"));
+        assert!(
+            remedy.contains("do ffmpeg -v error -y -i \"$f\""),
             "{remedy}"
         );
         let remedy = UnreadFormat::Dng.remedy(Path::new("1.dng"));

@@ -7,11 +7,11 @@ use nalgebra::Vector3;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
-use tunnelstitch_geometry::files::open_regular;
+use tunnelstitch_geometry::files::{is_standard_input, open_regular};
 
 /// Reads a file of points, in the order of the file: `visit` gets one after another, metres. The
 /// extension decides about the format: `ply`, `las`, `laz`, `pcd`, or `xyz`, `txt`, `csv`, `asc`
-/// and `pts` for text.
+/// and `pts` for text, which standard input has.
 ///
 /// # Errors
 /// [`PointsError`] that names the file, the line or the point, and the remedy: another extension, a
@@ -21,7 +21,10 @@ pub fn read_points(
     visit: &mut dyn FnMut(Vector3<f64>),
 ) -> Result<PointCount, PointsError> {
     let extension = path.extension().unwrap_or_default();
-    let extension = extension.to_string_lossy().to_ascii_lowercase();
+    let extension = match is_standard_input(path) {
+        true => "txt".to_owned(),
+        false => extension.to_string_lossy().to_ascii_lowercase(),
+    };
     let mut visitor = PointVisitor::new(path, visit);
     match extension.as_str() {
         "ply" => ply::read(&mut open(path)?, &mut visitor)?,

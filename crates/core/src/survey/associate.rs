@@ -3,6 +3,7 @@
 use super::error::SurveyError;
 use super::frame_times::from_names;
 use super::skipped_frame::SkippedFrame;
+use super::strangers::strangers_among;
 use crate::frames::FrameFile;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -63,16 +64,7 @@ pub(super) fn by_order(
             path: file.path.clone(),
             poses: file.entries.len(),
             frames: frames.len(),
-            remedy: if file.has_names() {
-                "; or associate them by name (--associate name)"
-            } else if file.has_times() && (times_s.is_some() || from_names(frames, None).is_ok()) {
-                "; or associate them by time (--associate time)"
-            } else if file.has_times() {
-                "; or associate them by time (--associate time), with a list of the frames' times \
-                 (--frame-times FILE)"
-            } else {
-                ""
-            },
+            remedy: count_remedy(file, frames, times_s),
         });
     }
     Ok(entries
@@ -80,6 +72,27 @@ pub(super) fn by_order(
         .enumerate()
         .map(|(k, entry)| stamped(entry, k, times_s))
         .collect())
+}
+
+/// The remedy for other numbers of poses and frames: to move away pictures that are no frames, or
+/// another association.
+fn count_remedy(file: &PoseFile, frames: &[FrameFile], times_s: Option<&[f64]>) -> String {
+    let strangers = (frames.len() > file.entries.len()).then(|| strangers_among(frames));
+    if let Some(Some(strangers)) = strangers {
+        return format!("; {strangers}");
+    }
+    let has_times = || times_s.is_some() || from_names(frames, None).is_ok();
+    let other = if file.has_names() {
+        "; or associate them by name (--associate name)"
+    } else if file.has_times() && has_times() {
+        "; or associate them by time (--associate time)"
+    } else if file.has_times() {
+        "; or associate them by time (--associate time), with a list of the frames' times \
+         (--frame-times FILE)"
+    } else {
+        ""
+    };
+    other.to_owned()
 }
 
 /// Associates poses by name: the name in the file of poses must equal the frame's path or its end.

@@ -2,6 +2,7 @@
 
 use super::file::SURVEY_FILE;
 use super::found_calibration::FoundCalibration;
+use super::joined_folders::joined;
 use super::left_aside::{LeftAside, reason_by_name, reason_of_text};
 use super::model_cameras::{FoundRig, camera_of};
 use super::picture_group::PictureGroup;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::recordings::is_recording;
 use tunnelstitch_geometry::trajectory::gyro::gopro_readout_ms;
 use tunnelstitch_geometry::trajectory::{
-    DuplicateTimes, PoseFile, PoseFileOptions, read_poses_with,
+    DuplicateTimes, PoseEntry, PoseFile, PoseFileOptions, read_poses_with,
 };
 
 /// Larger files are not tried as calibrations.
@@ -121,10 +122,33 @@ impl Discovery {
         }
         found.sort();
         found.find_cameras(folder);
+        found.join_folders();
         let rigs = found.rig.as_ref().map(|rig| rig.path.clone());
         aside.retain(|(path, _)| Some(path) != rigs.as_ref());
         found.left_aside = LeftAside::grouped(aside);
         Ok(found)
+    }
+
+    /// Takes the pictures of several folders as one sequence, if there are as many poses of one
+    /// camera.
+    fn join_folders(&mut self) {
+        let initial = self.initial().map(|(_, poses)| &poses.entries);
+        let of_one = |entries: &&Vec<PoseEntry>| {
+            let mut pairs = entries.windows(2);
+            pairs.all(|pair| pair[0].camera == pair[1].camera)
+        };
+        let count = initial.filter(of_one).map(Vec::len);
+        let all = count.and_then(|count| joined(&self.pictures, count));
+        if let Some(all) = all.filter(|all| self.rig.is_none() && all.count != self.frames().0) {
+            let matched = glob::Pattern::new(&all.pattern).ok();
+            let is_part = |group: &PictureGroup| {
+                matched
+                    .as_ref()
+                    .is_some_and(|m| m.matches_path(&group.first))
+            };
+            self.pictures.retain(|group| !is_part(group));
+            self.pictures.insert(0, all);
+        }
     }
 
     /// Finds the cameras that took the pictures, if the poses are those of a COLMAP model.

@@ -60,7 +60,7 @@ pub enum SurveyError {
         /// Frames found.
         frames: usize,
         /// Another remedy.
-        remedy: &'static str,
+        remedy: String,
     },
     /// Poses cannot be associated with frames, or their convention is unknown.
     #[error("{}: {what}", printed(path))]
@@ -72,9 +72,9 @@ pub enum SurveyError {
     },
     /// A frame's time is needed, but unknown.
     #[error(
-        "frame {frame} ({}): its name contains no time (seconds with a decimal point, or \
-         nanoseconds; time_unit under [frames] names another unit); give a file of times by \
-         --frame-times FILE (frames.times in survey.toml)",
+        "frame {frame} ({}): its name contains no time (seconds with a decimal point, or the \
+         digits of a time since 1970; time_unit under [frames] names another unit); give a file \
+         of times by --frame-times FILE (frames.times in survey.toml)",
         printed(file)
     )]
     FrameTime {

@@ -12,6 +12,8 @@ const UNREAD_EXTENSIONS: [&str; 16] = [
     "bmp", "dib", "gif", "pgm", "ppm", "pnm", "pam", "pfm", "jp2", "jxl", "exr", "heic", "heif",
     "hif", "avif", "dng",
 ];
+/// Extensions of archives.
+const ARCHIVE_EXTENSIONS: [&str; 8] = ["zip", "7z", "rar", "tar", "gz", "tgz", "bz2", "xz"];
 /// Extensions of files of measured points.
 const POINT_EXTENSIONS: [&str; 3] = ["ply", "las", "laz"];
 
@@ -35,9 +37,28 @@ pub struct LeftAside {
 impl LeftAside {
     /// True for pictures in a format that is not read.
     pub fn is_unread_picture(&self) -> bool {
+        is_unread(&self.extension())
+    }
+
+    /// True for archives, which may hold pictures.
+    pub fn is_archive(&self) -> bool {
+        ARCHIVE_EXTENSIONS.contains(&&*self.extension())
+    }
+
+    /// True for a file that was recognised as poses, but is faulty.
+    pub fn is_faulty_pose_file(&self) -> bool {
+        is_faulty(&self.reason, "no poses: ")
+    }
+
+    /// True for a file that was recognised as a calibration, but is faulty.
+    pub fn is_faulty_calibration(&self) -> bool {
+        is_faulty(&self.reason, "no calibration: ")
+    }
+
+    /// The extension in lower case.
+    fn extension(&self) -> String {
         let extension = Path::new(&self.pattern).extension().unwrap_or_default();
-        let extension = extension.to_string_lossy().to_lowercase();
-        is_unread(&extension)
+        extension.to_string_lossy().to_lowercase()
     }
 
     /// Files with their reasons; those of one folder with the same extension and reason are one.
@@ -66,6 +87,19 @@ impl LeftAside {
     }
 }
 
+/// The refusals of files that are of another kind altogether.
+const OTHER_KINDS: [&str; 3] = [
+    "not a calibration known",
+    "in no known format",
+    "holds no poses",
+];
+
+/// True for a reason with a refusal, behind `mark`, of a file that is of the right kind.
+fn is_faulty(reason: &str, mark: &str) -> bool {
+    let refusal = reason.split("; ").find_map(|part| part.strip_prefix(mark));
+    refusal.is_some_and(|text| !OTHER_KINDS.iter().any(|kind| text.contains(kind)))
+}
+
 /// True for the extension, in lower case, of pictures in a format that is not read.
 fn is_unread(extension: &str) -> bool {
     UNREAD_EXTENSIONS.contains(&extension) || RAW_EXTENSIONS.contains(&extension)
@@ -90,6 +124,18 @@ pub(super) fn reason_by_name(folder: &Path, file: &Path, extension: &str) -> Str
     match extension {
         "gcsv" => "a log of a gyro: tunnelstitch gyro makes poses of it".to_owned(),
         "db3" => "a recording of ROS 2 in SQLite: ros2 bag convert makes MCAP of it".to_owned(),
+        _ if ARCHIVE_EXTENSIONS.contains(&extension) => {
+            "an archive: unpack it, and run this again".to_owned()
+        }
+        "xlsx" | "xls" | "ods" | "numbers" => {
+            "a workbook of a spreadsheet: save the sheet as CSV".to_owned()
+        }
+        "rtf" | "doc" | "docx" | "odt" | "pdf" => {
+            "a document, not a table: save its text as .txt or .csv".to_owned()
+        }
+        "npy" | "npz" | "mat" | "pkl" | "h5" | "parquet" => {
+            "arrays of another program: write them as text, as numpy.savetxt does".to_owned()
+        }
         _ => "by its name no file of a survey".to_owned(),
     }
 }

@@ -51,9 +51,10 @@
 //! columns = { tx = "px" }     # CSV: names of columns in the header that are not known
 //! quaternion = "wxyz"         # TUM: or "xyzw"; by default as a comment names it, or "xyzw"
 //! convention = "c2w"          # or "w2c"; the default depends on the format
-//! camera_axes = "opencv"      # or "opengl"; the default depends on the format
+//! camera_axes = "opencv"      # or "opengl", "ros", "unity"; the default depends on the format
 //! body_to_camera = "cam.yaml" # for poses of a body (`trajectory::read_camera_in_body`)
 //! tunnel_frame = "axis.json"  # for another axis than y (`trajectory::read_tunnel_frame`)
+//! time_offset_s = 3600        # added to the times of the poses
 //! associate = "time"          # or "name" (default if the file has names), or "order"
 //! time_tolerance_s = 0.01     # largest difference of times; the default
 //! interpolate = true          # by default the nearer pose is taken
@@ -98,6 +99,7 @@ mod calibrated;
 mod camera_section;
 mod camera_sections;
 mod capture_times;
+mod clock_slip;
 mod discover;
 mod error;
 mod file;
@@ -108,6 +110,7 @@ mod frame_skipping;
 mod frame_times;
 mod ignore;
 mod interpreted_poses;
+mod joined_folders;
 mod keyframe_selection;
 mod left_aside;
 mod masked_wall;
@@ -129,6 +132,7 @@ mod rig_section;
 mod shape_file;
 mod skipped_frame;
 mod straight_axis;
+mod strangers;
 mod taken_frames;
 mod template;
 mod tunnel;

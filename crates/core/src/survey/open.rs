@@ -208,6 +208,7 @@ impl Survey {
         for section in survey.file.camera.all() {
             warnings.extend(readout_warning(section, &survey.folder));
         }
+        warnings.extend(survey.file.tunnel.size_warning());
         warnings.extend(picture_warnings);
         warnings.extend(survey.skipped_sentence());
         warnings.extend(

@@ -1,6 +1,7 @@
 //! Reading of a pose file to one pose per frame in the tunnel's frame.
 
 use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by_order, by_time};
+use super::clock_slip::ClockSlip;
 use super::error::SurveyError;
 use super::file::FramesSection;
 use super::frame_times;
@@ -84,7 +85,8 @@ impl<'a> PoseReader<'a> {
         missing: MissingPoses,
     ) -> Result<InterpretedPoses, SurveyError> {
         let is_rig = self.frames.pictures.len() > self.frames.frames.len();
-        let file = read_poses_with(path, &self.section.file_options(is_rig))?;
+        let options = self.section.file_options(is_rig);
+        let file = read_poses_with(path, &options)?.later(self.section.time_offset_s);
         let mut convention = Convention::of(file.format);
         convention.direction = self.section.convention.unwrap_or(convention.direction);
         convention.axes = self.section.camera_axes.unwrap_or(convention.axes);
@@ -109,7 +111,7 @@ impl<'a> PoseReader<'a> {
         } = self.frames;
         let default = match file.format {
             PoseFormat::Recording => Associate::Time,
-            _ if file.has_names() => Associate::Name,
+            _ if file.has_names() && !are_counters(&file, frames) => Associate::Name,
             _ => Associate::Order,
         };
         let (mut gaps, mut conflicts) = (Vec::new(), Vec::new());
@@ -194,12 +196,15 @@ impl<'a> PoseReader<'a> {
             let given = by_time(file, frames, &times_s, how)?;
             Ok((given, times_s))
         });
-        let (given, times_s) = associated.map_err(|error| match self.unit_slip(file, how) {
-            Some(slip) => SurveyError::Association {
-                path: file.path.clone(),
-                what: slip.to_string(),
-            },
-            None => error,
+        let (given, times_s) = associated.map_err(|error| {
+            let slip = || self.unit_slip(file, how).map(|slip| slip.to_string());
+            match self.clock_slip(file, how).or_else(slip) {
+                Some(what) => SurveyError::Association {
+                    path: file.path.clone(),
+                    what,
+                },
+                None => error,
+            }
         })?;
         let unit_m = self.section.unit_m.unwrap_or(1.0);
         Ok((given, frame_conflicts(file, &times_s, how, unit_m)))
@@ -216,6 +221,13 @@ impl PoseReader<'_> {
                 frame_times::from_names(self.frames.frames, unit).map(Cow::Owned)
             }
         }
+    }
+
+    /// The sentence about clocks that differ by a usual offset, if that makes the times fit.
+    fn clock_slip(&self, file: &PoseFile, how: TimeAssociation) -> Option<String> {
+        let times_s = self.frame_times().ok()?;
+        let found = ClockSlip::find(file, self.frames.frames, &times_s, how)?;
+        Some(found.sentence(self.section.time_offset_s))
     }
 
     /// Other units in which the times of the poses and those of the frames fit each other.
@@ -244,6 +256,22 @@ impl PoseReader<'_> {
         };
         UnitSlip::find(as_given, frames, how, poses_in, frames_in)
     }
+}
+
+/// True if the names of a file number the frames from 0 or 1, and are not those of pictures.
+fn are_counters(file: &PoseFile, frames: &[FrameFile]) -> bool {
+    let names = file.entries.iter().map(|entry| entry.name.as_deref());
+    let numbers = names.map(|name| name?.parse::<usize>().ok());
+    let Some(numbers) = numbers.collect::<Option<Vec<usize>>>() else {
+        return false;
+    };
+    let counts = |start: usize| numbers.iter().copied().eq(start..start + frames.len());
+    let is_name = |frame: &FrameFile| {
+        let stem = frame.path.file_stem().unwrap_or_default().to_string_lossy();
+        let mut names = file.entries.iter().map(|entry| entry.name.as_deref());
+        names.any(|name| name == Some(&*stem))
+    };
+    (counts(0) || counts(1)) && !frames.iter().take(1).any(is_name)
 }
 
 /// The poses of all pictures of a rig, if the file has as many, or names them all.

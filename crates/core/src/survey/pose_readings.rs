@@ -13,7 +13,9 @@ use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::Surface;
-use tunnelstitch_geometry::trajectory::{Pose, PoseFormat, StampedPose, Trajectory};
+use tunnelstitch_geometry::trajectory::{
+    CameraAxes, Convention, Pose, PoseFormat, StampedPose, Trajectory,
+};
 
 /// Units that positions may be given in instead of metres: their names, and their lengths, metres.
 const UNITS: [(&str, f64); 3] = [
@@ -25,11 +27,20 @@ const UNITS: [(&str, f64); 3] = [
 /// Focal lengths over the given one that are tried: nearer ones are found by estimating them.
 const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
 
-/// Radii of a round tunnel over the given one that are tried: a diameter is given for the radius,
-/// or half a radius, and tenths of a decade on both sides of these, since frames agree with a
+/// Radii of a round tunnel over the given one that people confuse, and what they gave.
+const RADIUS_SLIPS: [(f64, &str); 4] = [
+    (0.5, "of which twice the radius is given"),
+    (2.0, "of which half the radius is given"),
+    (0.3048, "of which the radius is given in feet"),
+    (
+        0.5 / std::f64::consts::PI,
+        "of which the circumference is given for the radius",
+    ),
+];
+/// Radii beside half and twice the given one, by tenths of a decade, since frames agree with a
 /// radius near the right one, too. Nearer ones than that are for `refine` to find.
-const RADIUS_FACTORS: [f64; 6] = [0.4, 0.5, 0.63, 1.58, 2.0, 2.5];
-/// Prior of a radius that is off by another factor than two, nats: one in twenty.
+const OTHER_RADIUS_FACTORS: [f64; 4] = [0.4, 0.63, 1.58, 2.5];
+/// Prior of a radius that is off by a factor without a name, nats: one in twenty.
 const OTHER_RADIUS_NATS: f64 = -3.0;
 
 /// Places that poses may be off by, later or earlier.
@@ -63,6 +74,9 @@ pub struct PoseReading {
     pub focal_factor: f64,
     /// Places by which the poses belong to later frames than given; earlier if it is negative.
     pub shift_frames: isize,
+    /// Factor of the errors of positions, at most 1: wider ones would excuse what the prior as
+    /// given does not.
+    pub error_scale: f64,
 }
 
 impl PoseReading {
@@ -76,6 +90,7 @@ impl PoseReading {
             orientation: PictureOrientation::Stored,
             focal_factor: 1.0,
             shift_frames: 0,
+            error_scale: 1.0,
         }
     }
 
@@ -114,7 +129,12 @@ impl Survey {
             .read(&self.folder.join(&section.initial), section.missing_poses())?;
         let surface = self.surface.as_ref();
         let as_given = PoseReading::of_poses(String::new(), 0, self.initial.clone());
+        // A body of ROS sees what a camera sees whose pictures are turned by a quarter.
+        let is_ambiguous = |convention: &Convention| {
+            convention.axes == CameraAxes::Ros && self.has_turned_pictures()
+        };
         let conventions = feasible_conventions(surface, &given).into_iter();
+        let conventions = conventions.filter(|(_, convention)| !is_ambiguous(convention));
         let conventions = conventions.map(|(flags, convention)| {
             let initial = given.trajectory_in(&convention);
             PoseReading::of_poses(flags.join(" and "), flags.len(), initial)
@@ -147,6 +167,12 @@ impl Survey {
         Ok(std::iter::once(as_given.clone()).chain(others).collect())
     }
 
+    /// True if pictures are turned as their EXIF data ask.
+    fn has_turned_pictures(&self) -> bool {
+        let mut readings = self.frames.iter().filter_map(|frame| frame.reading());
+        readings.any(|reading| reading.orientation == PictureOrientation::Exif)
+    }
+
     /// Readings of another focal length than given, beyond those that refining searches by itself.
     fn other_focal_lengths(&self, as_given: &PoseReading) -> impl Iterator<Item = PoseReading> {
         let section = self.file.calibrate.as_ref();
@@ -167,25 +193,30 @@ impl Survey {
     }
 
     /// Readings of a straight round tunnel with another radius. Pictures of it are those of the
-    /// given one, seen from positions that are scaled about its axis. Poses without a scale say
-    /// nothing of it.
+    /// given one, seen from positions that are scaled about its axis, as their errors are. Poses
+    /// without a scale say nothing of it.
     fn other_radii(&self, format: PoseFormat) -> impl Iterator<Item = PoseReading> {
         let tunnel = &self.file.tunnel;
         let is_straight = tunnel.centreline.is_none() && self.bend.is_none();
         let has_scale = self.file.poses.unit_m.is_some() || !format.has_no_scale();
         let radius_m = tunnel.radius_m.filter(|_| is_straight && has_scale);
-        let factors = RADIUS_FACTORS.into_iter();
-        factors.filter_map(move |factor| {
-            let radius_m = factor * radius_m?;
+        let slips = RADIUS_SLIPS.map(|(factor, what)| (factor, what.to_owned(), 0.0));
+        let others = OTHER_RADIUS_FACTORS.map(|factor| {
+            let what = format!("of about {factor} times the given radius");
+            (factor, what, OTHER_RADIUS_NATS)
+        });
+        let all = slips.into_iter().chain(others);
+        all.filter_map(move |(factor, what, prior_nats)| {
+            let radius_m = rounded(factor * radius_m?);
             let scaled = |stamped: &StampedPose| StampedPose {
                 pose: Pose::new(stamped.pose.r_wc, stamped.pose.t_wc / factor),
                 ..*stamped
             };
-            let remedy = radius_remedy(factor, radius_m);
+            let remedy = format!("a tunnel {what} (radius_m = {radius_m} under [tunnel])");
             let initial = self.initial.iter().map(scaled).collect();
-            let is_diameter = [0.5, 2.0].contains(&factor);
             let reading = PoseReading {
-                prior_nats: if is_diameter { 0.0 } else { OTHER_RADIUS_NATS },
+                prior_nats,
+                error_scale: (1.0 / factor).min(1.0),
                 ..PoseReading::of_poses(remedy, 1, initial)
             };
             is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)
@@ -218,18 +249,6 @@ fn shift_remedy(shift_frames: isize) -> String {
     let frames = if count == 1 { "frame" } else { "frames" };
     let direction = if shift_frames > 0 { "later" } else { "earlier" };
     format!("the poses {count} {frames} {direction} (shift_frames = {shift_frames} under [poses])")
-}
-
-/// Another radius, `factor` times the given one, and the line that gives it.
-fn radius_remedy(factor: f64, radius_m: f64) -> String {
-    let line = format!("(radius_m = {} under [tunnel])", rounded(radius_m));
-    if factor == 0.5 {
-        format!("a tunnel of which twice the radius is given {line}")
-    } else if factor == 2.0 {
-        format!("a tunnel of which half the radius is given {line}")
-    } else {
-        format!("a tunnel of about {factor} times the given radius {line}")
-    }
 }
 
 /// A length rounded to a tenth of a millimetre, without the digits of binary fractions.
@@ -292,11 +311,12 @@ mod tests {
         let fixture = std::path::Path::new("../../fixtures/blender_free48");
         let survey = Survey::open(fixture).unwrap();
         let radii = |format| survey.other_radii(format).count();
-        assert_eq!(radii(PoseFormat::Tum), RADIUS_FACTORS.len());
+        let all = RADIUS_SLIPS.len() + OTHER_RADIUS_FACTORS.len();
+        assert_eq!(radii(PoseFormat::Tum), all);
         assert_eq!(radii(PoseFormat::Colmap), 0);
         let change = |file: &mut crate::survey::SurveyFile| file.poses.unit_m = Some(1.0);
         let with_unit = Survey::open_with(fixture, change).unwrap();
         let count = with_unit.other_radii(PoseFormat::Colmap).count();
-        assert_eq!(count, RADIUS_FACTORS.len());
+        assert_eq!(count, all);
     }
 }

@@ -14,7 +14,7 @@ use std::path::Path;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::surface::{Surface, mean_radius_m};
-use tunnelstitch_geometry::trajectory::{Convention, Pose, TunnelAxis, so3};
+use tunnelstitch_geometry::trajectory::{CameraAxes, Convention, Pose, TunnelAxis, so3};
 
 /// Smallest number of frames from which a convention is judged.
 const MIN_FRAMES: usize = 4;
@@ -193,12 +193,18 @@ impl ConventionChange {
     }
 }
 
+/// All camera axes, the given ones first.
+fn all_axes(given: CameraAxes) -> impl Iterator<Item = CameraAxes> {
+    let others = CameraAxes::ALL.into_iter();
+    std::iter::once(given).chain(others.filter(move |axes| *axes != given))
+}
+
 /// All other conventions of direction, camera axes and mount.
 fn convention_changes(reading: &InterpretedPoses) -> Vec<ConventionChange> {
     let given = reading.convention;
     let mut found = Vec::new();
     for direction in [given.direction, given.direction.other()] {
-        for axes in [given.axes, given.axes.other()] {
+        for axes in all_axes(given.axes) {
             for invert in [false, true] {
                 if invert && given.camera_in_body.is_none() {
                     continue;

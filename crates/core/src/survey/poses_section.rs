@@ -40,9 +40,12 @@ pub struct PosesSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quaternion: Option<QuaternionOrder>,
     /// The unit of times in TUM files, and in CSV files whose header does not tell; by default
-    /// numbers of 16 digits and more are nanoseconds, all others seconds.
+    /// the digits of times since 1970 tell it, and all others are seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_unit: Option<TimeUnit>,
+    /// Seconds to add to the times of the files, whose clock may be behind that of the frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_offset_s: Option<f64>,
     /// The direction of the poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub convention: Option<Direction>,

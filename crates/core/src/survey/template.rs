@@ -10,7 +10,7 @@ use tunnelstitch_geometry::trajectory::PoseFormat;
 /// Keys of `[poses]` that are only mentioned.
 const CONVENTIONS: &str = "\
 # convention = \"c2w\"       # or \"w2c\"; each format has its own
-# camera_axes = \"opencv\"   # or \"opengl\"; each format has its own
+# camera_axes = \"opencv\"   # or \"opengl\", \"ros\", \"unity\"; each format has its own
 ";
 
 /// The table `[prior]`.

@@ -18,6 +18,8 @@ use tunnelstitch_geometry::trajectory::{PoseError, text};
 pub const DEFAULT_SHAPE_SIGMA_RADII: f64 = 1.0 / 300.0;
 /// Largest 1-σ of it, radii.
 const MAX_SHAPE_SIGMA_RADII: f64 = 0.1;
+/// Radius above which a unit is more likely wrong, metres: the widest caverns span 100 m.
+const MAX_USUAL_RADIUS_M: f64 = 100.0;
 /// Largest 1-σ of the radius, percent.
 const MAX_RADIUS_SIGMA_PERCENT: f64 = 30.0;
 
@@ -97,6 +99,18 @@ impl TunnelSection {
         self.radius_m
             .or(self.width_m.map(|width_m| 0.5 * width_m))
             .unwrap_or_default()
+    }
+
+    /// The sentence about a radius that no tunnel has, if it is one.
+    pub fn size_warning(&self) -> Option<String> {
+        let radius_m = self
+            .radius_m
+            .filter(|radius_m| *radius_m > MAX_USUAL_RADIUS_M)?;
+        Some(format!(
+            "tunnel.radius_m is {radius_m}, and no tunnel is so wide; if it is in millimetres, \
+             write radius_m = {}",
+            radius_m / 1e3
+        ))
     }
 
     /// True for a straight round tunnel, whose radius and axis can be estimated.
@@ -279,6 +293,13 @@ mod tests {
             let error = read(bad).unwrap_err();
             assert!(error.contains(&format!("curve.txt:{line}: ")), "{error}");
         }
+    }
+
+    #[test]
+    fn a_radius_in_millimetres_is_named() {
+        let warning = |radius_m| TunnelSection::round(radius_m).size_warning();
+        assert_eq!(warning(40.0), None);
+        assert!(warning(3000.0).unwrap().ends_with("radius_m = 3"));
     }
 
     #[test]

@@ -10,6 +10,7 @@
 //! | largest sizes of text files | [`limits`] |
 //! | lines and columns of texts | [`place`] |
 //! | files that are locked or appended to, and targets that may be replaced | [`targets`] |
+//! | standard input as a file | [`standard_input`] |
 //! | elements of XML files | [`xml`] |
 //! | names and texts without control characters | [`printed()`] |
 
@@ -20,6 +21,7 @@ pub mod limits;
 pub mod place;
 pub mod printed;
 pub mod regular;
+pub mod standard_input;
 pub mod targets;
 pub mod xml;
 
@@ -28,4 +30,5 @@ pub use encoding::decode_text;
 pub use place::line_and_column;
 pub use printed::{escape_controls, printed};
 pub use regular::{open_regular, read_regular, read_text};
+pub use standard_input::{is_standard_input, path_or_standard_input};
 pub use targets::{check_replaceable_file, open_without_links, write_without_links};

@@ -3,11 +3,12 @@
 //! A file name may hold any character. On a terminal, control characters move the cursor, change
 //! colours or the title, and directional marks reorder what is read.
 
+use super::standard_input::name_of;
 use std::fmt::{self, Display, Write};
 use std::path::Path;
 
 /// A path as it is printed: control characters are escaped as in `\u{1b}` or `\n`, and bytes that
-/// are not UTF-8 as in `\xff`.
+/// are not UTF-8 as in `\xff`. Standard input is named so.
 pub fn printed(path: &Path) -> impl Display + '_ {
     PrintedPath(path)
 }
@@ -16,6 +17,9 @@ struct PrintedPath<'a>(&'a Path);
 
 impl Display for PrintedPath<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if let Some(name) = name_of(self.0) {
+            return f.write_str(name);
+        }
         for chunk in self.0.as_os_str().as_encoded_bytes().utf8_chunks() {
             chunk
                 .valid()

@@ -1,16 +1,20 @@
 //! Opening and reading of regular files.
 
 use super::encoding::decode_text;
+use super::standard_input;
 use std::fs::{File, FileType, OpenOptions};
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
 /// Opens a regular file for reading, and nothing else: a named pipe would wait for its writer, and
-/// a device may have no end.
+/// a device may have no end. Standard input is opened, too, if a command names it.
 ///
 /// # Errors
 /// An error of the operating system; a folder, named pipe, socket or device.
 pub fn open_regular(path: &Path) -> io::Result<File> {
+    if standard_input::is_standard_input(path) {
+        return standard_input::open();
+    }
     // Checked first, because opening alone has effects on some devices.
     check_regular(path.metadata()?.file_type())?;
     let mut options = OpenOptions::new();

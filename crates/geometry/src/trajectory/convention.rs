@@ -101,6 +101,25 @@ mod tests {
         assert_eq!(twice.r_wc.coords, -pose.r_wc.coords);
     }
 
+    /// The camera of a robot looks along its body's x axis, its right is the body's −y.
+    #[test]
+    fn bodies_and_left_handed_poses_are_turned_as_their_matrices_say() {
+        let pose = pose(0.1, 2.0, -0.4);
+        let turned = CameraAxes::Ros.turn(&pose);
+        for (camera, body) in [
+            (Vector3::z(), Vector3::x()),
+            (Vector3::x(), -Vector3::y()),
+            (Vector3::y(), -Vector3::z()),
+        ] {
+            assert!((turned.r_wc * camera - pose.r_wc * body).norm() < 1e-15);
+        }
+        let mirror = nalgebra::Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, 1.0));
+        let turned = CameraAxes::Unity.turn(&pose);
+        let [own, given] = [turned, pose].map(|p| p.r_wc.to_rotation_matrix().into_inner());
+        assert!((own - mirror * given * mirror).norm() < 1e-14);
+        assert_eq!(turned.t_wc, mirror * pose.t_wc);
+    }
+
     #[test]
     fn a_pose_of_the_programs_own_convention_stays_to_the_bit() {
         let pose = pose(0.1, 2.0, -0.4);

@@ -1,6 +1,7 @@
 //! Detection of a pose file's format from its content.
 
 use super::error::PoseError;
+use super::float::float;
 use super::format::PoseFormat;
 use super::pose_options::PoseFileOptions;
 use super::quaternion_order::QuaternionOrder;
@@ -40,10 +41,7 @@ pub(super) fn detect_format(
         return Ok(PoseFormat::Colmap);
     }
     let words = row::words(line).map_err(|what| PoseError::line(path, number, what))?;
-    let numbers = words
-        .iter()
-        .filter(|word| word.parse::<f64>().is_ok())
-        .count();
+    let numbers = words.iter().filter(|word| float(word).is_some()).count();
     match (numbers, words.len()) {
         // A line of a wrong length is reported by the parser of the nearest format.
         (12, 12) | (kitti::WHOLE_MATRIX, kitti::WHOLE_MATRIX) => Ok(PoseFormat::Kitti),

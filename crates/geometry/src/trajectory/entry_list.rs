@@ -1,5 +1,6 @@
 //! Poses of a file in the order of their times.
 
+use super::iso_time::DAY_S;
 use super::pose_conflict::PoseConflict;
 use super::pose_entry::PoseEntry;
 
@@ -60,9 +61,7 @@ impl EntryList {
             && let (Some(time_s), Some(last_s)) = (entry.time_s, last.time_s)
         {
             if time_s < last_s {
-                return Err(format!(
-                    "timestamp {time_s} after {last_s}: sort the file by time"
-                ));
+                return Err(unordered(time_s, last_s));
             }
             if time_s == last_s && self.duplicates != DuplicateTimes::Keep {
                 if self.duplicates == DuplicateTimes::Refuse {
@@ -87,6 +86,18 @@ impl EntryList {
     pub fn into_parsed(self) -> ParsedPoses {
         self.parsed
     }
+}
+
+/// The error of a time before the last pose's, both seconds.
+fn unordered(time_s: f64, last_s: f64) -> String {
+    // A clock of the day that goes back by more than half of it has passed midnight.
+    let is_midnight = last_s < DAY_S && last_s - time_s > 0.5 * DAY_S;
+    let remedy = if is_midnight {
+        "if the clock began again at midnight, add 86400 to the times from there on"
+    } else {
+        "sort the file by time"
+    };
+    format!("timestamp {time_s} after {last_s}: {remedy}")
 }
 
 #[cfg(test)]
@@ -124,6 +135,17 @@ mod tests {
         };
         assert_eq!((conflict.entry, conflict.lines), (1, [7, 9]));
         assert!((conflict.distance - 0.0012).abs() < 1e-12 && conflict.angle_deg == 0.0);
+    }
+
+    #[test]
+    fn a_clock_that_passed_midnight_is_not_to_be_sorted() {
+        let mut list = EntryList::new(DuplicateTimes::Refuse);
+        list.push(1, entry(86399.0, 0.0)).unwrap();
+        let message = list.push(2, entry(0.5, 0.0)).unwrap_err();
+        assert!(
+            message.contains("midnight") && !message.contains("sort"),
+            "{message}"
+        );
     }
 
     #[test]

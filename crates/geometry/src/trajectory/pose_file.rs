@@ -40,6 +40,16 @@ impl PoseFile {
         self.entries.iter().enumerate().map(stamped).collect()
     }
 
+    /// The poses at times that are so many seconds later, if any.
+    #[must_use]
+    pub fn later(mut self, offset_s: Option<f64>) -> Self {
+        let times = self.entries.iter_mut().flat_map(|entry| &mut entry.time_s);
+        for time_s in times {
+            *time_s += offset_s.unwrap_or_default();
+        }
+        self
+    }
+
     /// True if all poses have names.
     pub fn has_names(&self) -> bool {
         self.entries.iter().all(|entry| entry.name.is_some())

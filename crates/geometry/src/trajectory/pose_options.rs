@@ -17,7 +17,7 @@ pub struct PoseFileOptions {
     /// TUM: the order of the quaternion's numbers; by default the one that a comment names, or
     /// TUM's own.
     pub quaternion: Option<QuaternionOrder>,
-    /// TUM, and CSV whose header does not tell: the unit of times; by default numbers of 16 digits
+    /// TUM, and CSV whose header does not tell: the unit of times; by default numbers of 17 digits
     /// and more are nanoseconds, all others seconds.
     pub time_unit: Option<TimeUnit>,
     /// Recordings: the topic.

@@ -65,6 +65,8 @@ mod tests {
             "0.5;-1;2e3",
             "0,5; -1; 2e3;",
             "0,5\t-1\t2e3",
+            "0,5;−1;2.000,0",
+            "0.5 -1 2D3",
         ] {
             assert_eq!(numbers(line, "a b c"), Ok([0.5, -1.0, 2e3]), "{line}");
         }
@@ -76,7 +78,7 @@ mod tests {
             ("0,5 -1,0 2,0", "6 columns where `a b c` has 3"),
             ("0.5,,-1,2", "column 2 is empty"),
             (";1;2;3", "column 1 is empty"),
-            ("1.000,5;1;2", "`1.000,5` is not a number"),
+            ("1.00,5;1;2", "`1.00,5` is not a number"),
             ("1,000,5;1;2", "`1,000,5` is not a number"),
         ] {
             let message = numbers::<3>(line, "a b c").unwrap_err();

@@ -2,6 +2,7 @@
 
 use super::entry_list::{DuplicateTimes, EntryList, ParsedPoses};
 use super::error::PoseError;
+use super::float::float;
 use super::pose_entry::PoseEntry;
 use super::time_unit::TimeUnit;
 use super::times;
@@ -51,42 +52,65 @@ pub(super) fn stamped_lines(
 
 /// Parses a finite number; `form` describes the line for the error message.
 pub fn number(word: &str, form: &str) -> Result<f64, String> {
-    match word.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        Ok(_) => Err(format!(
+    match float(word) {
+        Some(value) if value.is_finite() => Ok(value),
+        Some(_) => Err(format!(
             "`{word}` is not finite; remove the frame or give it a pose"
         )),
-        Err(_) => Err(format!("`{word}` is not a number; a pose is `{form}`")),
+        None => Err(format!("`{word}` is not a number; a pose is `{form}`")),
     }
 }
 
 /// Parses a finite number of a table other than a pose file.
 pub fn finite(word: &str) -> Result<f64, String> {
-    let value = word.parse::<f64>().ok().filter(|value| value.is_finite());
+    let value = float(word).filter(|value| value.is_finite());
     value.ok_or_else(|| format!("`{word}` is not a finite number"))
 }
 
-/// Parses a time in `unit`, to seconds; without one, whole numbers of 16 digits and more are
-/// nanoseconds, all others seconds. `form` describes the line for the error message.
+/// Parses a time to seconds, as [`times::from_word`] does. `form` describes the line for the error
+/// message.
 pub(super) fn time(word: &str, unit: Option<TimeUnit>, form: &str) -> Result<f64, String> {
+    if let Some(time_s) = times::from_word(word, unit) {
+        return Ok(time_s);
+    }
     number(word, form)?;
-    times::from_word(word, unit)
-        .ok_or_else(|| format!("`{word}` is not a time; give seconds, or whole nanoseconds"))
+    Err(format!(
+        "`{word}` is not a time; give seconds, or whole nanoseconds"
+    ))
 }
 
 /// The number with a decimal point instead of a decimal comma, which it may have where commas do
-/// not separate.
+/// not separate, and without separators of thousands.
 pub(super) fn with_decimal_point(word: &str, separator: u8) -> Cow<'_, str> {
+    if let Some(number) = without_thousands(word) {
+        return Cow::Owned(number);
+    }
     match word.split_once(',') {
         Some((whole, fraction)) if separator != b',' && !word.contains('.') => {
             let number = format!("{whole}.{fraction}");
-            if number.parse::<f64>().is_ok() {
+            if float(&number).is_some() {
                 return Cow::Owned(number);
             }
             Cow::Borrowed(word)
         }
         _ => Cow::Borrowed(word),
     }
+}
+
+/// The number with a decimal point alone, if points and commas are in it: the last of them is
+/// decimal, and the others stand before groups of three digits, as in `1.234,5` and `1,234.5`.
+fn without_thousands(word: &str) -> Option<String> {
+    let (whole, decimals) = word.split_at(word.rfind(['.', ','])?);
+    let mark = if decimals.starts_with(',') { '.' } else { ',' };
+    let mut groups = whole.split(mark);
+    let first = groups.next()?.trim_start_matches(['-', '+', '−']);
+    let mut others = groups.peekable();
+    others.peek()?;
+    let is_number = |group: &str| group.bytes().all(|byte| byte.is_ascii_digit());
+    let is_grouped = (1..=3).contains(&first.len())
+        && is_number(first)
+        && others.all(|group| group.len() == 3 && is_number(group));
+    is_grouped.then(|| format!("{}.{}", whole.replace(mark, ""), &decimals[1..]))
 }
 
 /// The rotation of a quaternion; `order` is the order of its numbers in the file, for the error

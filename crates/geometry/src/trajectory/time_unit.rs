@@ -1,5 +1,6 @@
 //! Units of times in files and names.
 
+use super::float::float;
 use super::nanoseconds::from_nanoseconds;
 use serde::{Deserialize, Serialize};
 
@@ -54,7 +55,7 @@ impl TimeUnit {
 
     /// Converts a number to seconds; `None` if it is not a finite number.
     pub fn seconds(self, word: &str) -> Option<f64> {
-        let number = word.parse::<f64>().ok().filter(|value| value.is_finite())?;
+        let number = float(word).filter(|value| value.is_finite())?;
         Some(match self {
             Self::S => number,
             Self::Ms => number / 1e3,

@@ -1,41 +1,43 @@
-//! Times in text: seconds, or nanoseconds as whole numbers, unless another unit is given.
+//! Times in text: in a given unit, or in that which their digits tell; or dates.
 
-use super::nanoseconds::from_nanoseconds;
+use super::float::float;
+use super::iso_time;
 use super::time_unit::TimeUnit;
 
-/// Smallest number of digits of a whole number that is read as nanoseconds: nanoseconds since 1970
-/// have 19 digits from 2001 on, and no clock counts that many seconds.
-pub const MIN_NANOSECOND_DIGITS: usize = 16;
+/// Smallest number of digits of a whole number that is nanoseconds since 1970, or of a computer's
+/// start: no clock counts that many of another unit.
+pub const MIN_NANOSECOND_DIGITS: usize = 17;
 
-/// Number of digits of milliseconds since 1970, from 2001 to 2286; counters of frames have fewer.
-const MILLISECOND_DIGITS: usize = 13;
+/// The unit in which a number is a time since 1970: seconds have 10 digits before the decimal point
+/// from 2001 to 2286, milliseconds 13 and microseconds 16; 17 and more are nanoseconds. All other
+/// numbers are seconds, of a clock or a counter that started with a recording.
+fn unit_since_1970(number: f64) -> TimeUnit {
+    match number {
+        1e12..1e13 => TimeUnit::Ms,
+        1e15..1e16 => TimeUnit::Us,
+        1e16.. => TimeUnit::Ns,
+        _ => TimeUnit::S,
+    }
+}
 
-/// Smallest number with so many digits.
-const MIN_NANOSECONDS: f64 = 1e15;
-
-/// Converts a number to seconds: it is in `unit`; without one, numbers of 16 digits and more before
-/// the decimal point are nanoseconds, everything else is seconds. `None` if it is not a finite
-/// number.
+/// Converts a time to seconds: a number in `unit` or, without one, in that which its digits tell;
+/// or a date or a time of day of ISO 8601. `None` if it is neither.
 pub fn from_word(word: &str, unit: Option<TimeUnit>) -> Option<f64> {
     if let Some(unit) = unit {
         return unit.seconds(word);
     }
-    let is_whole = !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
-    if is_whole && word.len() >= MIN_NANOSECOND_DIGITS {
-        return from_nanoseconds(word).ok();
-    }
-    let number = word.parse::<f64>().ok().filter(|value| value.is_finite())?;
-    if number < MIN_NANOSECONDS {
-        return Some(number);
-    }
-    let is_countable = number <= i64::MAX as f64;
-    let rounded = is_countable.then_some(number * 1e-9);
-    from_nanoseconds(word).ok().or(rounded)
+    let Some(number) = float(word) else {
+        return iso_time::seconds(word);
+    };
+    let is_time = number.is_finite() && number <= i64::MAX as f64;
+    is_time
+        .then(|| unit_since_1970(number).seconds(word))
+        .flatten()
 }
 
 /// The time in a file's name (without its extension): its last number, in `unit`. Without one, that
-/// must have a decimal point (seconds), ten digits (seconds since 1970), 13 (milliseconds since
-/// 1970) or 16 and more (nanoseconds); other numbers are treated as counters.
+/// must have a decimal point (seconds) or the digits of a time since 1970: ten (seconds), 13
+/// (milliseconds), 16 (microseconds) or more (nanoseconds); other numbers are treated as counters.
 pub fn from_name(stem: &str, unit: Option<TimeUnit>) -> Option<f64> {
     let is_part = |c: char| c.is_ascii_digit() || c == '.';
     let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
@@ -43,20 +45,43 @@ pub fn from_name(stem: &str, unit: Option<TimeUnit>) -> Option<f64> {
         at + stem[at..].chars().next().map_or(1, char::len_utf8)
     });
     let word = stem[begin..end].trim_start_matches('.');
-    let unit = match (unit, word.len()) {
-        (None, MILLISECOND_DIGITS) if !word.contains('.') => Some(TimeUnit::Ms),
-        _ => unit,
-    };
-    let is_time = unit.is_some()
-        || word.contains('.')
-        || word.len() == 10
-        || word.len() >= MIN_NANOSECOND_DIGITS;
+    let has_digits = matches!(word.len(), 10 | 13 | 16 | MIN_NANOSECOND_DIGITS..);
+    let is_time = unit.is_some() || word.contains('.') || has_digits;
     is_time.then(|| from_word(word, unit)).flatten()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trajectory::nanoseconds::from_nanoseconds;
+
+    /// One time since 1970 in every unit, and numbers that are none.
+    #[test]
+    fn the_digits_of_a_time_since_1970_tell_its_unit() {
+        for word in [
+            "1403636579.75",
+            "1403636579750",
+            "1403636579750.0",
+            "1403636579750000",
+            "1.40363657975e15",
+            "1403636579750000000",
+            "2014-06-24T19:02:59.75Z",
+        ] {
+            assert_eq!(from_word(word, None), Some(1403636579.75), "{word}");
+        }
+        for (word, time_s) in [
+            ("0.00000125", 0.00000125),
+            ("17", 17.0),
+            ("-3.5", -3.5),
+            ("86399.999", 86399.999),
+            ("20261125084738", 20261125084738.0),
+            ("999999999999", 999999999999.0),
+        ] {
+            assert_eq!(from_word(word, None), Some(time_s), "{word}");
+        }
+        // A computer that has run for four months.
+        assert_eq!(from_word("10368000000000000", None), Some(10368000.0));
+    }
 
     #[test]
     fn whole_numbers_of_many_digits_are_nanoseconds() {
@@ -99,6 +124,7 @@ mod tests {
             ("1305031102", Some(1305031102.0)),
             ("left-12.5-rect", Some(12.5)),
             ("IMG_1403636579763", Some(1403636579.763)),
+            ("f_1403636579763555", Some(1403636579.763555)),
             ("20140624210259", None),
             ("000017", None),
             ("ärger", None),

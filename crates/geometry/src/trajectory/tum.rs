@@ -1,6 +1,6 @@
 //! TUM: lines `time tx ty tz qx qy qz qw`, seconds and metres, camera-to-world.
 //!
-//! Times of 16 digits and more are nanoseconds, as ORB-SLAM3 writes them, and a comment may name
+//! Times of 17 digits and more are nanoseconds, as ORB-SLAM3 writes them, and a comment may name
 //! another unit, as `[ms]`. Commas, semicolons and tabs may separate, and a comment before the
 //! first pose may name `qw` first.
 //!

@@ -24,18 +24,21 @@ impl Comparison {
         pairs.map(move |(reading, given)| deviation(given) - deviation(reading))
     }
 
-    /// Logarithm of the odds of a reading to the one given, by priors alone, or by pixels, too,
-    /// where a pair fits in both.
+    /// Evidence of each pair for a reading against the one given, nats, by priors alone, or by
+    /// pixels, too, where a pair fits in both.
     ///
     /// Only another focal length makes pairs correlate better or worse than as given. In all other
     /// readings they differ by chance, which tells nothing.
-    pub fn log_odds(&self, reading: &[Option<Registered>], by_pixels: bool) -> f64 {
+    pub fn pair_nats(&self, reading: &[Option<Registered>], by_pixels: bool) -> Vec<f64> {
         let of_pixels = |(reading, given): (&Option<Registered>, &Option<Registered>)| {
             Some((*reading)?.log_likelihood - (*given)?.log_likelihood)
         };
         let pairs = reading.iter().zip(&self.of_given);
-        let of_pixels = pairs.filter(|_| by_pixels).filter_map(of_pixels);
-        self.evidence(reading).sum::<f64>() + of_pixels.sum::<f64>()
+        let of_pixels = pairs.map(|pair| of_pixels(pair).filter(|_| by_pixels));
+        let evidence = self.evidence(reading).zip(of_pixels);
+        evidence
+            .map(|(of_prior, of_pixels)| of_prior + of_pixels.unwrap_or_default())
+            .collect()
     }
 
     /// True if a reading may be taken whose first pairs are `reading` and in which all others fit
@@ -131,8 +134,12 @@ mod tests {
             least_nats: 3.0,
             min_pair_nats: 0.0,
         };
-        let odds = |of_pixels: f64| comparison.log_odds(&[correlates(1.0, of_pixels); 3], true);
-        let by_priors = comparison.log_odds(&[correlates(1.0, 0.0); 3], false);
+        let nats = |of_pixels: f64, by_pixels| -> f64 {
+            let reading = [correlates(1.0, of_pixels); 3];
+            comparison.pair_nats(&reading, by_pixels).iter().sum()
+        };
+        let odds = |of_pixels: f64| nats(of_pixels, true);
+        let by_priors = nats(0.0, false);
         assert_eq!(by_priors, 4.0 + MAX_DEVIATION_COST - 1.0);
         assert_eq!(odds(40.0), by_priors);
         assert_eq!(odds(30.0), by_priors - 20.0);

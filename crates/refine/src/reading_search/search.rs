@@ -15,6 +15,9 @@ const MIN_PAIRS: usize = 4;
 /// Evidence below that of the best reading with which another is named beside it, nats: odds of one
 /// to twenty.
 const MAX_DEFICIT_NATS: f64 = 3.0;
+/// Standard errors by which the evidence of pairs for the best reading exceeds that for another one
+/// that it is told from: the 95 % quantile of a normal distribution.
+const MIN_TOLD_SIGMAS: f64 = 1.645;
 /// Evidence of a pair that speaks for poses of other frames, nats: half of that by which its steps
 /// differ at least.
 const MIN_SHIFT_NATS: f64 = 0.5 * MAX_DEVIATION_COST;
@@ -39,6 +42,26 @@ struct Found<'r> {
     pairs: usize,
     /// Natural logarithm of its odds to the reading given.
     log_odds: f64,
+    /// The evidence of each pair, nats; empty if these are not evenly distributed.
+    pair_nats: Vec<f64>,
+}
+
+impl Found<'_> {
+    /// True if a reading that has more evidence is told from this one: by its odds, and by the
+    /// evidence of pairs, which differs by more than it scatters (Q. H. Vuong, "Likelihood ratio
+    /// tests for model selection and non-nested hypotheses", Econometrica 57, 1989).
+    fn is_told_from(&self, best: &Self) -> bool {
+        if best.log_odds - self.log_odds <= MAX_DEFICIT_NATS {
+            return false;
+        }
+        let pairs = best.pair_nats.iter().zip(&self.pair_nats);
+        let differences: Vec<f64> = pairs.map(|(best, own)| best - own).collect();
+        let count = differences.len() as f64;
+        let sum: f64 = differences.iter().sum();
+        let squares: f64 = differences.iter().map(|d| (d - sum / count).powi(2)).sum();
+        let is_usual = self.reading.prior_nats >= 0.0;
+        differences.is_empty() || !is_usual || sum > MIN_TOLD_SIGMAS * squares.sqrt()
+    }
 }
 
 /// Looks for readings that neighbouring frames agree with; None if they do with the one given, or
@@ -174,7 +197,8 @@ fn compare<'r>(
         return Ok(None);
     }
     let registered = pictures.register(reading, |some| comparison.may_take(some))?;
-    let log_odds = reading.prior_nats + comparison.log_odds(&registered, reading.changes_lens());
+    let pair_nats = comparison.pair_nats(&registered, reading.changes_lens());
+    let log_odds = reading.prior_nats + pair_nats.iter().sum::<f64>();
     let is_taken = comparison.may_take(&registered) && log_odds > comparison.least_nats;
     Ok(is_taken.then(|| Found {
         reading,
@@ -182,19 +206,21 @@ fn compare<'r>(
         given: comparison.of_given.iter().flatten().count(),
         pairs: comparison.of_given.len(),
         log_odds,
+        pair_nats: match reading.shift_frames {
+            0 => pair_nats,
+            _ => Vec::new(),
+        },
     }))
 }
 
-/// The readings found, the most probable first, without those that are far less so.
+/// The readings found, the most probable first, without those that it is told from.
 fn name(mut found: Vec<Found>) -> Option<FittingReadings> {
     found.sort_by(|a, b| {
         let by_odds = b.log_odds.total_cmp(&a.log_odds);
         by_odds.then(a.reading.changes.cmp(&b.reading.changes))
     });
     let best = found.first()?;
-    let named = found
-        .iter()
-        .filter(|one| best.log_odds - one.log_odds <= MAX_DEFICIT_NATS);
+    let named = found.iter().filter(|one| !one.is_told_from(best));
     Some(FittingReadings {
         readings: named.map(|one| one.reading.remedy.clone()).collect(),
         fitting: best.fitting,
@@ -202,4 +228,50 @@ fn name(mut found: Vec<Found>) -> Option<FittingReadings> {
         pairs: best.pairs,
         log_odds: best.log_odds,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tunnelstitch_core::frames::PictureOrientation;
+
+    /// A usual reading, or one that is improbable from the beginning.
+    fn reading(prior_nats: f64) -> PoseReading {
+        PoseReading {
+            remedy: format!("{prior_nats}"),
+            changes: 1,
+            prior_nats,
+            initial: Vec::new(),
+            orientation: PictureOrientation::Stored,
+            focal_factor: 1.0,
+            shift_frames: 0,
+            error_scale: 1.0,
+        }
+    }
+
+    fn found<'r>(reading: &'r PoseReading, pair_nats: &[f64]) -> Found<'r> {
+        Found {
+            reading,
+            fitting: pair_nats.len(),
+            given: 0,
+            pairs: pair_nats.len(),
+            log_odds: reading.prior_nats + pair_nats.iter().sum::<f64>(),
+            pair_nats: pair_nats.to_vec(),
+        }
+    }
+
+    /// Of equal sums, those whose pairs disagree do not tell readings apart.
+    #[test]
+    fn readings_are_told_apart_where_pairs_agree() {
+        let (usual, rare) = (reading(0.0), reading(-3.0));
+        let best = found(&usual, &[30.0; 8]);
+        let steady = found(&usual, &[29.0; 8]);
+        let mixed = found(&usual, &[24.0, 34.0, 25.0, 33.0, 26.0, 34.0, 24.0, 32.0]);
+        assert!(steady.is_told_from(&best) && !mixed.is_told_from(&best));
+        assert_eq!(steady.log_odds, mixed.log_odds);
+        // A reading that is improbable from the beginning needs more.
+        assert!(found(&rare, &mixed.pair_nats).is_told_from(&best));
+        // Within odds of one to twenty, nothing is told.
+        assert!(!found(&usual, &[29.8; 8]).is_told_from(&best));
+    }
 }

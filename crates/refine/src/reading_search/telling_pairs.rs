@@ -105,6 +105,7 @@ mod tests {
             orientation: PictureOrientation::Stored,
             shift_frames,
             focal_factor: 1.0,
+            error_scale: 1.0,
         }
     }
 

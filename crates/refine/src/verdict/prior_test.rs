@@ -157,10 +157,19 @@ impl PriorTest {
     }
 }
 
+/// Factor over its σ below which it is none: refined steps then go anywhere.
+const MIN_FACTOR_SIGMAS: f64 = 3.0;
+
 impl ScaleTest {
     /// The contradiction and its likely cause.
     pub fn explain(&self, radius_m: f64) -> String {
         let Self { factor, sigma, .. } = self;
+        if *factor < MIN_FACTOR_SIGMAS * sigma {
+            return format!(
+                "refined steps do not follow the initial ones ({factor:.2} ± {sigma:.2} times \
+                 them): check the order of columns, the axes and the times of the poses"
+            );
+        }
         let is_near = |value: f64| (factor / value).ln().abs() < 3.0 * sigma / factor + 0.05;
         let cause = if is_near(2.0) {
             "a diameter given for the radius?"
@@ -168,6 +177,8 @@ impl ScaleTest {
             "a radius given that is half of it, or steps counted twice?"
         } else if is_near(3.2808) || is_near(0.3048) {
             "feet for metres?"
+        } else if is_near(std::f64::consts::TAU) {
+            "a circumference given for the radius?"
         } else {
             "check radius_m, and unit and times of the poses"
         };

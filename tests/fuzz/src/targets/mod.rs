@@ -9,6 +9,7 @@ pub mod discovery;
 pub mod frame_times;
 pub mod frames_of_reference;
 pub mod gyro;
+pub mod jobs;
 pub mod mark_changes;
 pub mod marks;
 pub mod names;
@@ -23,13 +24,14 @@ pub mod runs;
 pub mod survey;
 pub mod sweep;
 pub mod video;
+pub mod wall_files;
 pub mod words;
 
 /// Reads an input. It panics on what must not be.
 pub type Target = fn(&[u8]);
 
 /// All targets by their names.
-pub const TARGETS: [(&str, Target); 23] = [
+pub const TARGETS: [(&str, Target); 25] = [
     ("calibration", calibration::run),
     ("centreline", centreline::run),
     ("checkpoint", checkpoint::run),
@@ -38,6 +40,7 @@ pub const TARGETS: [(&str, Target); 23] = [
     ("frame_times", frame_times::run),
     ("frames_of_reference", frames_of_reference::run),
     ("gyro", gyro::run),
+    ("jobs", jobs::run),
     ("mark_changes", mark_changes::run),
     ("marks", marks::run),
     ("names", names::run),
@@ -52,5 +55,6 @@ pub const TARGETS: [(&str, Target); 23] = [
     ("survey", survey::run),
     ("sweep", sweep::run),
     ("video", video::run),
+    ("wall_files", wall_files::run),
     ("words", words::run),
 ];

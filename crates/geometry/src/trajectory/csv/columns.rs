@@ -21,8 +21,7 @@ pub(super) struct Columns {
 /// Indices of the columns of a time.
 #[derive(Clone, Copy)]
 pub(super) enum TimeColumn {
-    /// Numbers of a unit; without one, seconds, or whole numbers of 16 digits and more, which are
-    /// nanoseconds.
+    /// Numbers of a unit; without one, of that which their digits tell.
     One(usize, Option<TimeUnit>),
     /// Whole nanoseconds.
     Nanoseconds(usize),

@@ -1,7 +1,7 @@
 //! The header of a table of poses.
 
 use super::pose_column::{ColumnMap, PoseColumn};
-use super::table::{records, separator, split};
+use super::table::{records, separator, separator_or_blank, split};
 use super::title::Title;
 use crate::trajectory::text;
 
@@ -53,7 +53,7 @@ impl<'a> Header<'a> {
         Some(Self {
             number,
             line,
-            separator: named.unwrap_or_else(|| separator(line)),
+            separator: named.unwrap_or_else(|| separator_or_blank(line)),
         })
     }
 

@@ -1,8 +1,8 @@
 //! CSV files with named columns: `frame,time_s,tx_m,ty_m,tz_m,qx,qy,qz,qw`, camera-to-world.
 //!
 //! Columns are found by name, in any order; other columns are ignored. `frame` and the time may be
-//! missing; whole numbers of 16 digits and more are nanoseconds in any column of times. Commas,
-//! semicolons and tabs separate; numbers may have decimal commas where commas do not separate, and
+//! missing; times have the unit that their digits tell. Commas, semicolons, tabs, or else blanks
+//! separate; numbers may have decimal commas where commas do not separate, and
 //! names may stand in quotes. A line `sep=;` before the header names the separator, as spreadsheets
 //! write it.
 //!

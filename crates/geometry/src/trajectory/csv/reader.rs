@@ -181,6 +181,27 @@ mod tests {
         );
     }
 
+    /// Thousands, decimal commas, empty cells and rows, blanks and dates.
+    #[test]
+    fn tables_of_spreadsheets_are_read() {
+        let pose = "0.5,-1,1234.5,0,0,0,1";
+        let plain = parse(
+            Path::new("p.csv"),
+            &format!("tx,ty,tz,qx,qy,qz,qw\n{pose}\n"),
+        );
+        let plain = plain.unwrap();
+        for text in [
+            "tx,ty,tz,qx,qy,qz,qw,,\r\n0.5,-1,\"1,234.5\",0,0,0,1,,\r\n,,,,,,,,\r\n",
+            "tx;ty;tz;qx;qy;qz;qw\n0,5;−1;1.234,5;0;0;0;1\n;;;;;;\n",
+            "tx ty tz  qx qy qz qw\n0.5 -1 1234.5 0 0  0 1\n",
+        ] {
+            assert_eq!(parse(Path::new("p.csv"), text).unwrap(), plain, "{text}");
+        }
+        let dated = "time,tx,ty,tz,qx,qy,qz,qw\n2026-11-25 08:47:38.5,0.5,-1,1234.5,0,0,0,1\n";
+        let dated = parse(Path::new("p.csv"), dated).unwrap();
+        assert_eq!(dated[0].time_s, Some(1795596458.5));
+    }
+
     #[test]
     fn a_quote_that_is_never_closed_is_an_error_of_its_line() {
         let text = format!("# poses\n{FORM}\n\"a,0,0,0,0,0,0,0,1\nb,1,0,0,0,0,0,0,1\n");

@@ -23,7 +23,9 @@ pub(super) fn records(text: &str, separator: u8) -> impl Iterator<Item = (usize,
             let (record, after) = rest.split_at(end);
             rest = after;
             let record = record.trim();
-            if !(record.is_empty() || is_comment) {
+            // Spreadsheets write rows of separators alone.
+            let is_empty = record.bytes().all(|byte| byte == separator || byte == b' ');
+            if !(is_empty || is_comment) {
                 return Some((first, record));
             }
         }
@@ -59,8 +61,17 @@ pub(crate) fn separator(header: &str) -> u8 {
         .unwrap_or(b',')
 }
 
-/// Splits a line into columns.
+/// The separator of a table's columns, from its first line, in which blanks may separate, too.
+pub(super) fn separator_or_blank(header: &str) -> u8 {
+    let is_blank = !header.contains(['\t', ';', ',']) && header.contains(' ');
+    if is_blank { b' ' } else { separator(header) }
+}
+
+/// Splits a line into columns. Several blanks separate as one does.
 pub(crate) fn split(line: &str, separator: u8) -> Result<StringRecord, String> {
+    if separator == b' ' {
+        return Ok(line.split_whitespace().collect());
+    }
     let mut reader = ReaderBuilder::new()
         .delimiter(separator)
         .has_headers(false)
