@@ -61,8 +61,15 @@ impl FrameStates {
             .collect()
     }
 
-    /// True if the inliers have a [`majority`]. If not, they may be those that are wrong, and to
-    /// register the others on them is in vain.
+    /// True if there are more inliers than frames that fit elsewhere on the wall: then others may be
+    /// registered on what they show. Frames that have fitted nowhere yet do not speak against them.
+    pub fn outnumber_misplaced(&self) -> bool {
+        let inliers = self.rejections.iter().filter(|reason| reason.is_none());
+        let reasons = self.rejections.iter().flatten();
+        inliers.count() > reasons.filter(|reason| reason.is_misplaced()).count()
+    }
+
+    /// True if the inliers have a [`majority`]. If not, they may be those that are wrong.
     pub fn has_majority(&self) -> bool {
         majority(&self.rejections).is_ok()
     }

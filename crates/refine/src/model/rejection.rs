@@ -98,6 +98,17 @@ impl RejectionReason {
         )
     }
 
+    /// True if the image fits the wall somewhere, but not the other frames.
+    pub fn is_misplaced(&self) -> bool {
+        matches!(
+            self,
+            Self::Contradicts { .. }
+                | Self::Disagrees { .. }
+                | Self::Misaligned { .. }
+                | Self::Disconnected { .. }
+        )
+    }
+
     /// True if the frame may register successfully among other neighbours.
     pub fn is_retriable(&self) -> bool {
         matches!(

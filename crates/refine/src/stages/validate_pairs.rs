@@ -9,7 +9,7 @@ use crate::stages::state::Estimation;
 use crate::thresholds::assessment::MAX_PAIR_ITERATIONS;
 use crate::tracking::track::register_rejected;
 use crate::validation::blurred_frames::find_blurred_frames;
-use crate::validation::inconsistent_frames::find_contradictions;
+use crate::validation::inconsistent_frames::{find_inconsistent_frames, known_relations};
 use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 
 /// Runs the stage at the finest level of tracking.
@@ -25,14 +25,15 @@ pub fn run<'a>(
     let context = setup.context(state);
     let (count, options) = (setup.count(), setup.options);
     let (coarsest, finest) = (setup.coarsest_level(), setup.handover_level());
+    let relations = known_relations(&context);
     let frames = &mut state.frames;
     session.progress.start("check", MAX_PAIR_ITERATIONS);
     for iteration in 0..MAX_PAIR_ITERATIONS {
         let pairs = compute_pairwise_ncc(&context, finest, frames, &(0..count))?;
-        frames.reject(find_contradictions(&pairs, count));
+        frames.reject(find_inconsistent_frames(&pairs, &relations, count));
         frames.reject(find_blurred_frames(&pairs, count));
         if iteration + 1 == MAX_PAIR_ITERATIONS
-            || !frames.has_majority()
+            || !frames.outnumber_misplaced()
             || register_rejected(&context, options, frames)? == 0
         {
             break;

@@ -22,7 +22,7 @@ use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::{PosePrediction, predict_pose};
 use crate::tracking::registration::{Effort, Registered, register_frame};
 use crate::tracking::windows::{LONG_WINDOW_STRIDE, solve_long_window, solve_sliding_window};
-use crate::validation::inconsistent_frames::find_contradictions;
+use crate::validation::inconsistent_frames::{find_inconsistent_frames, known_relations};
 use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::surface::Footprint;
@@ -155,7 +155,11 @@ impl Tracking {
         let count = states.estimates.len();
         let level = options.handover_level(context.cameras.shorter_side());
         let pairs = compute_pairwise_ncc(context, level, &states, &(0..count))?;
-        states.reject(find_contradictions(&pairs, count));
+        states.reject(find_inconsistent_frames(
+            &pairs,
+            &known_relations(context),
+            count,
+        ));
         Ok(states.has_majority())
     }
 

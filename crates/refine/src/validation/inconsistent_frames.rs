@@ -1,10 +1,12 @@
 //! Rejection of frames that the others do not support.
 //!
-//! A frame is an inlier if it does not contradict the inliers that it shares wall with, and if
-//! pairs that show the same wall connect it with the others. Agreement of neighbours is not enough:
-//! a group of frames can be right in itself and stand in the wrong place, if all that it shares
-//! with the others is a strip that contradicts, or the prior. The relation of a rig's cameras
-//! connects them as a pair does, if it is known as well.
+//! A frame is an inlier if pairs that show the same wall connect it with most of the others, and if
+//! it does not contradict the inliers that it shares wall with. Agreement of neighbours is not
+//! enough: a group of frames can be right in itself and stand in the wrong place. Nor is a
+//! contradiction: of a pair that does not show the same wall only one frame need be wrong. So the
+//! largest group that agreeing pairs connect is believed against all others, and what contradicts
+//! itself within it is rejected frame by frame. The relation of a rig's cameras connects them as a
+//! pair does, if it is known as well.
 
 use crate::model::context::EstimationContext;
 use crate::model::rejection::RejectionReason;
@@ -12,88 +14,126 @@ use crate::thresholds::inconsistent_frames::{MAX_CONTRADICTING_SHARE, MAX_RELATI
 use crate::validation::pairwise_ncc::PairNcc;
 use tunnelstitch_geometry::surface::mean_radius_m;
 
-/// Finds the frames that contradict the others, worst first, and those of the rest that no pair,
-/// nor a relation of a rig ([`known_relations`]), connects with the largest group.
+/// Finds the frames outside the largest group that pairs which show the same wall, or relations of
+/// a rig ([`known_relations`]), connect, and those within it that contradict it.
+///
+/// Frames that share no texture with any other are not judged.
 pub fn find_inconsistent_frames(
     pairs: &[PairNcc],
     relations: &[(usize, usize)],
     frames: usize,
 ) -> Vec<(usize, RejectionReason)> {
-    let mut rejections = find_contradictions(pairs, frames);
-    let mut is_judged = vec![false; frames];
+    let mut comparison = Comparison {
+        pairs,
+        relations,
+        is_compared: vec![false; frames],
+        reasons: vec![None; frames],
+    };
     for pair in pairs {
-        (is_judged[pair.a], is_judged[pair.b]) = (true, true);
+        comparison.is_compared[pair.a] = true;
+        comparison.is_compared[pair.b] = true;
     }
-    for (frame, _) in &rejections {
-        is_judged[*frame] = false;
-    }
-    let same_wall = pairs.iter().filter(|pair| !pair.contradicts);
-    let same_wall = same_wall.map(|pair| (pair.a, pair.b));
-    let connections = same_wall.chain(relations.iter().copied());
-    let connections = connections.filter(|(a, b)| is_judged[*a] && is_judged[*b]);
-    let group = connected_components(connections, frames);
-    // Frames that share no texture with any other are not judged here.
-    let judged: Vec<usize> = (0..frames).filter(|k| is_judged[*k]).collect();
-    let mut sizes = vec![0usize; frames];
-    for k in &judged {
-        sizes[group[*k]] += 1;
-    }
-    let largest = (0..frames).max_by_key(|k| (sizes[*k], std::cmp::Reverse(*k)));
-    let disconnected = judged.iter().filter(|k| Some(group[**k]) != largest);
-    rejections.extend(disconnected.map(|k| {
-        let frames = sizes[group[*k]];
-        (*k, RejectionReason::Disconnected { frames })
-    }));
-    rejections
+    comparison.reject_groups();
+    comparison.reject_contradicting();
+    comparison.reject_groups();
+    let reasons = comparison.reasons.into_iter().enumerate();
+    reasons
+        .filter_map(|(k, reason)| Some((k, reason?)))
+        .collect()
 }
 
-/// Finds the frames that contradict the others, worst first.
-///
-/// Frames are rejected one by one, always the one with the largest share of its samples in
-/// contradicting pairs, until that is at most [`MAX_CONTRADICTING_SHARE`] for every frame.
-pub fn find_contradictions(pairs: &[PairNcc], frames: usize) -> Vec<(usize, RejectionReason)> {
-    let (mut all, mut contradicting) = (vec![0.0; frames], vec![0.0; frames]);
-    let mut of_frame: Vec<Vec<usize>> = vec![Vec::new(); frames];
-    for (k, pair) in pairs.iter().enumerate() {
-        for frame in [pair.a, pair.b] {
-            all[frame] += pair.samples;
-            if pair.contradicts {
-                contradicting[frame] += pair.samples;
-            }
-            of_frame[frame].push(k);
+/// The comparison of all frames.
+struct Comparison<'c> {
+    pairs: &'c [PairNcc],
+    relations: &'c [(usize, usize)],
+    /// True for frames that share texture with others.
+    is_compared: Vec<bool>,
+    /// The reasons of those rejected so far.
+    reasons: Vec<Option<RejectionReason>>,
+}
+
+impl Comparison<'_> {
+    fn is_inlier(&self, frame: usize) -> bool {
+        self.is_compared[frame] && self.reasons[frame].is_none()
+    }
+
+    /// Rejects the inliers outside their largest connected group.
+    fn reject_groups(&mut self) {
+        let frames = self.reasons.len();
+        let same_wall = self.pairs.iter().filter(|pair| !pair.contradicts);
+        let same_wall = same_wall.map(|pair| (pair.a, pair.b));
+        let connections = same_wall.chain(self.relations.iter().copied());
+        let connections = connections.filter(|(a, b)| self.is_inlier(*a) && self.is_inlier(*b));
+        let group = connected_components(connections, frames);
+        let judged: Vec<usize> = (0..frames).filter(|k| self.is_inlier(*k)).collect();
+        let mut sizes = vec![0usize; frames];
+        for k in &judged {
+            sizes[group[*k]] += 1;
+        }
+        let largest = (0..frames).max_by_key(|k| (sizes[*k], std::cmp::Reverse(*k)));
+        let is_outside = |k: &usize| Some(group[*k]) != largest;
+        let is_inside = |k: usize| self.is_inlier(k) && !is_outside(&k);
+        let outside = judged.into_iter().filter(is_outside);
+        let reasons: Vec<(usize, RejectionReason)> = outside
+            .map(|k| {
+                let frames = sizes[group[k]];
+                let contradiction = self.worst_contradiction(k, is_inside);
+                (
+                    k,
+                    contradiction.unwrap_or(RejectionReason::Disconnected { frames }),
+                )
+            })
+            .collect();
+        for (k, reason) in reasons {
+            self.reasons[k] = Some(reason);
         }
     }
-    let mut rejected = vec![false; frames];
-    let mut rejections = Vec::new();
-    loop {
-        let worst = (0..frames)
-            .filter(|k| !rejected[*k] && contradicting[*k] > MAX_CONTRADICTING_SHARE * all[*k])
-            .max_by(|a, b| (contradicting[*a] / all[*a]).total_cmp(&(contradicting[*b] / all[*b])));
-        let Some(worst) = worst else {
-            return rejections;
-        };
-        rejected[worst] = true;
-        let mut against = (worst, 1.0);
-        for pair in of_frame[worst].iter().map(|k| &pairs[*k]) {
-            let other = if pair.a == worst { pair.b } else { pair.a };
-            if rejected[other] {
-                continue;
-            }
-            all[other] -= pair.samples;
-            if pair.contradicts {
-                contradicting[other] -= pair.samples;
-                if pair.correlation < against.1 {
-                    against = (other, pair.correlation);
+
+    /// Rejects frames that contradict the other inliers, one by one, always the one with the
+    /// largest share of its samples in contradicting pairs, until that is at most
+    /// [`MAX_CONTRADICTING_SHARE`] for every frame.
+    fn reject_contradicting(&mut self) {
+        while let Some(worst) = self.most_contradicting() {
+            let contradiction = self.worst_contradiction(worst, |k| self.is_inlier(k));
+            self.reasons[worst] = contradiction;
+        }
+    }
+
+    /// The inlier with the largest share of its samples in contradicting pairs of inliers, if that
+    /// is more than [`MAX_CONTRADICTING_SHARE`].
+    fn most_contradicting(&self) -> Option<usize> {
+        let frames = self.reasons.len();
+        let (mut all, mut contradicting) = (vec![0.0; frames], vec![0.0; frames]);
+        for pair in self.pairs {
+            if self.is_inlier(pair.a) && self.is_inlier(pair.b) {
+                for frame in [pair.a, pair.b] {
+                    all[frame] += pair.samples;
+                    contradicting[frame] += if pair.contradicts { pair.samples } else { 0.0 };
                 }
             }
         }
-        rejections.push((
-            worst,
-            RejectionReason::Contradicts {
-                frame: against.0,
-                correlation: against.1,
-            },
-        ));
+        let share = |k: &usize| contradicting[*k] / all[*k];
+        let too_much = |k: &usize| contradicting[*k] > MAX_CONTRADICTING_SHARE * all[*k];
+        let frames = (0..frames).filter(too_much);
+        frames.max_by(|a, b| share(a).total_cmp(&share(b)))
+    }
+
+    /// The pair in which a frame contradicts one of certain others most, as the reason to reject
+    /// it.
+    fn worst_contradiction(
+        &self,
+        frame: usize,
+        is_other: impl Fn(usize) -> bool,
+    ) -> Option<RejectionReason> {
+        let contradicting = self.pairs.iter().filter(|pair| pair.contradicts);
+        let against = contradicting.filter_map(|pair| match pair {
+            pair if pair.a == frame => Some((pair.b, pair.correlation)),
+            pair if pair.b == frame => Some((pair.a, pair.correlation)),
+            _ => None,
+        });
+        let against = against.filter(|(other, _)| is_other(*other));
+        let (frame, correlation) = against.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(RejectionReason::Contradicts { frame, correlation })
     }
 }
 
@@ -173,6 +213,21 @@ mod tests {
         let rejections = find(&pairs, 9);
         assert_eq!(rejections.len(), 1);
         assert_eq!(rejections[0].0, 5);
+    }
+
+    /// Two wrong frames that agree with each other, and contradict the last of the others in more
+    /// of its samples than it contradicts of theirs.
+    #[test]
+    fn the_largest_group_is_believed_against_its_frames_that_others_contradict() {
+        let mut pairs = chain(0..9);
+        pairs.push(pair(9, 10, 0.9));
+        pairs.extend([pair(8, 9, 0.1), pair(8, 10, 0.0)]);
+        let rejections = find(&pairs, 11);
+        let contradicts = |frame, correlation| RejectionReason::Contradicts { frame, correlation };
+        assert_eq!(
+            rejections,
+            [(9, contradicts(8, 0.1)), (10, contradicts(8, 0.0))]
+        );
     }
 
     #[test]
