@@ -191,7 +191,6 @@ fn stages_left(stages: &VecDeque<Stage>, displaced: bool) -> (Vec<Stage>, VecDeq
     let mut over: Vec<Stage> = stages.iter().copied().collect();
     let left = over.split_off(last.unwrap_or(over.len()));
     let validate = displaced.then_some(Stage::ValidatePairs);
-    over.retain(|stage| Some(*stage) != validate);
     (over, validate.into_iter().chain(left).collect())
 }
 

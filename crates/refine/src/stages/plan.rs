@@ -43,8 +43,8 @@ impl Stage {
     }
 }
 
-/// The stages of a refinement: track coarsely, check, solve at full size, resolve aliases, solve
-/// with denser samples, assess.
+/// The stages of a refinement: track coarsely, check, solve at full size, check again with the
+/// lens and the shape that this has found, resolve aliases, solve with denser samples, assess.
 pub fn plan_stages(options: &RefineOptions) -> VecDeque<Stage> {
     let mut stages = VecDeque::from([
         Stage::Prescreen,
@@ -52,6 +52,7 @@ pub fn plan_stages(options: &RefineOptions) -> VecDeque<Stage> {
         Stage::CorrectShading,
         Stage::ValidatePairs,
         Stage::Solve(SolvePlan::first(options)),
+        Stage::ValidatePairs,
         Stage::ResolveAliases,
         Stage::Solve(SolvePlan::last(options)),
     ]);
