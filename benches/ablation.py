@@ -34,7 +34,7 @@ EDITS = [
     ("repeated tracking of the first frames", "tracking/alternating_calibration.rs",
      "if change < MAX_SHADING_CHANGE {", "if true {"),
     ("shading from all overlaps", "stages/plan.rs", "        Stage::CorrectShading,\n", ""),
-    ("pairwise NCC", "validation/inconsistent_frames.rs",
+    ("pairwise NCC", "comparison/inconsistent_frames.rs",
      "    for pair in pairs {\n        comparison",
      "    if true { return Vec::new(); }\n    for pair in pairs {\n        comparison"),
     ("blur test", "thresholds.rs", "pub const MIN_SHARPNESS_RATIO: f64 = 0.5;",

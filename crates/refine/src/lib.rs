@@ -14,9 +14,9 @@
 //! | [`prescreen`](stages::prescreen) | rejects useless frames; first model of the light, sensor noise | [`tracking::prescreening`], [`tracking::first_light`] |
 //! | [`track`](stages::track) | registers one frame after another on the wall that its predecessors show; sliding windows | [`tracking`] |
 //! | [`correct_shading`](stages::correct_shading) | light that moves with the camera, from the overlaps | [`tunnelstitch_photometry`] |
-//! | [`solve`](stages::solve) | all frames together, at full size | [`problem`], [`solver`] |
-//! | [`validate_pairs`](stages::validate_pairs) | rejects frames that contradict the others | [`validation::pairwise_ncc`] |
-//! | [`repair`](stages::repair) | rejects inconsistent frames, registers them again, resolves aliases | [`validation`] |
+//! | [`validate_pairs`](stages::validate_pairs) | rejects frames outside the largest group that agrees pair by pair, and registers them again | [`comparison`] |
+//! | [`solve`](stages::solve) | all frames together, at full size; then pairs are validated again | [`problem`], [`solver`] |
+//! | [`resolve_aliases`](stages::resolve_aliases) | moves frames to where the prior has them if they fit there as well | [`validation`] |
 //! | [`solve`](stages::solve), last | full size, dense samples; then jointly with the wall, if asked for | [`joint`] |
 //! | [`assess`](stages::assess) | uncertainty and verdict of every frame and of the survey | [`uncertainty`], [`verdict`] |
 //!
@@ -37,8 +37,8 @@
 //! the start, and the equations of the points stand beside those of the pixels ([`points`]).
 //!
 //! Dependencies point downwards only, in the order parameters, linear, points, model, tiles,
-//! samples, joint, problem, solver, point_fit, tracking, validation, uncertainty, verdict, stages,
-//! pipeline. Every tuned number is in [`thresholds`].
+//! samples, joint, problem, solver, point_fit, comparison, tracking, validation, uncertainty,
+//! verdict, stages, pipeline. Every tuned number is in [`thresholds`].
 //!
 //! # Speed
 //!
@@ -54,6 +54,7 @@
 //!
 //! What each technique contributes is measured by `benches/ablation.py`.
 
+mod comparison;
 mod deformation_bound;
 mod error;
 mod input;

@@ -188,7 +188,7 @@ pub mod correlation_search {
     pub const PITCH_STEP_RAD: f64 = 0.12;
 }
 
-/// Thresholds of `tracking/ncc_score.rs`.
+/// Thresholds of `comparison/ncc_score.rs`.
 pub mod reference_mosaic {
     /// Share of the contrast's variance that must be texture for a correlation to be corrected for
     /// noise.
@@ -288,7 +288,7 @@ pub mod stopping {
     pub const INTERMEDIATE_STEP_SIGMA: f64 = 2.0;
 }
 
-/// Thresholds of `validation/pairwise_ncc.rs` and `validation/blurred_frames.rs`.
+/// Thresholds of `comparison/pairwise_ncc.rs` and `comparison/blurred_frames.rs`.
 pub mod pairwise_ncc {
     /// Half width of the window of local contrast in the coarse comparison, pixels of the level.
     ///
@@ -343,7 +343,7 @@ pub mod pairwise_ncc {
     pub const MIN_SHARPNESS_RATIO: f64 = 0.5;
 }
 
-/// Thresholds of `validation/inconsistent_frames.rs`.
+/// Thresholds of `comparison/inconsistent_frames.rs`.
 pub mod inconsistent_frames {
     /// Share of a frame's samples in contradicting pairs up to which it is kept.
     ///

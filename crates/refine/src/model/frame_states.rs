@@ -61,8 +61,9 @@ impl FrameStates {
             .collect()
     }
 
-    /// True if there are more inliers than frames that fit elsewhere on the wall: then others may be
-    /// registered on what they show. Frames that have fitted nowhere yet do not speak against them.
+    /// True if there are more inliers than frames that fit elsewhere on the wall: then others may
+    /// be registered on what they show. Frames that have fitted nowhere yet do not speak against
+    /// them.
     pub fn outnumber_misplaced(&self) -> bool {
         let inliers = self.rejections.iter().filter(|reason| reason.is_none());
         let reasons = self.rejections.iter().flatten();

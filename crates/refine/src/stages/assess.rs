@@ -1,5 +1,7 @@
 //! Stage: states the uncertainty and the verdict of every frame, and writes the report.
 
+use crate::comparison::inconsistent_frames::{find_inconsistent_frames, known_relations};
+use crate::comparison::pairwise_ncc::compute_pairwise_ncc;
 use crate::error::RefineError;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::{FrameStates, majority};
@@ -21,8 +23,6 @@ use crate::uncertainty::frame_sigma::FrameSigma;
 use crate::uncertainty::rolling_shutter_test::estimate_readout;
 use crate::uncertainty::shape_report::{EstimatedShape, ShapeReport};
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
-use crate::validation::inconsistent_frames::{find_inconsistent_frames, known_relations};
-use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 use crate::verdict::frame_verdict::FrameEvidence;
 
 /// Runs the stage on the last full-size solve.

@@ -1,6 +1,9 @@
 //! Stage: compares all frames pair by pair, rejects those that contradict the others or are
 //! blurred, registers rejected ones again, and solves.
 
+use crate::comparison::blurred_frames::find_blurred_frames;
+use crate::comparison::inconsistent_frames::{find_inconsistent_frames, known_relations};
+use crate::comparison::pairwise_ncc::compute_pairwise_ncc;
 use crate::error::RefineError;
 use crate::solver::solve_levels::solve_levels;
 use crate::stages::session::Session;
@@ -8,9 +11,6 @@ use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
 use crate::thresholds::assessment::MAX_PAIR_ITERATIONS;
 use crate::tracking::track::register_rejected;
-use crate::validation::blurred_frames::find_blurred_frames;
-use crate::validation::inconsistent_frames::{find_inconsistent_frames, known_relations};
-use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 
 /// Runs the stage at the finest level of tracking.
 ///

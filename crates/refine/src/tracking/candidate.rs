@@ -1,12 +1,12 @@
 //! Refined hypotheses of a frame's pose, and the choice between them.
 
+use crate::comparison::ncc_score::NccScore;
+use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::rejection::RejectionReason;
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::thresholds::registration::{MAX_UNEXPLAINED_RATIO, MIN_CORRELATION, MIN_UNEXPLAINED};
 use crate::tracking::correlation_search::{MIN_SEPARATION_SAMPLES, min_samples};
-use crate::tracking::ncc_score::NccScore;
 use crate::tracking::pose_separation::separation_m;
-use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::Surface;
 

@@ -10,6 +10,7 @@
 //! `ℓ = −(n/2ν) ln(1 − c²) − ½ ωᵀΣ⁻¹ω`, n the samples that both show, ν those that share one
 //! independent piece of texture.
 
+use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::context::EstimationContext;
 use crate::thresholds::correlation_search::{MIN_OVERLAP_SHARE, SAMPLES_PER_INDEPENDENT_PIECE};
 use crate::tracking::correlator::{CorrelationMaximum, Correlator};
@@ -17,7 +18,6 @@ use crate::tracking::reference_mosaic::ReferenceMosaic;
 use crate::tracking::search_across::{SearchAcross, tunnel_axis_in_camera};
 use crate::tracking::search_along::SearchAlong;
 use crate::tracking::search_grid::{MIN_SEPARATION_STEPS, SearchGrid, Turns};
-use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use nalgebra::Vector2;
 use rayon::prelude::*;
 use tunnelstitch_geometry::camera::Camera;

@@ -10,8 +10,8 @@
 //! Padfield, "Masked object registration in the Fourier domain", IEEE Trans. Image Processing
 //! 21(5), 2012 (masks).
 
+use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::tracking::reference_mosaic::ReferenceMosaic;
-use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use nalgebra::Vector2;
 use tunnelstitch_geometry::numerics::spectrum::{Spectrum, Transform};
 use tunnelstitch_geometry::trajectory::Pose;

@@ -1,10 +1,10 @@
 //! The frames around one that is registered, and those of them that share wall with it.
 
+use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::samples::footprints::footprint;
-use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use std::ops::Range;
 use tunnelstitch_geometry::camera::Sweep;
 use tunnelstitch_geometry::surface::Footprint;

@@ -1,13 +1,13 @@
 //! Reference mosaic: the wall around a frame, fused from the registered frames.
 
+use crate::comparison::mosaic_grid::{MosaicGrid, pixel_size_m};
+use crate::comparison::ncc_score::NccScore;
+use crate::comparison::unwrapped_frame::{UnwrappedFrame, UnwrappedSampler};
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::samples::footprints::RESOLVED_RANGE_RADII;
 use crate::samples::viewpoint::Viewpoint;
-use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
-use crate::tracking::ncc_score::NccScore;
-use crate::tracking::unwrapped_frame::{UnwrappedFrame, UnwrappedSampler};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use tunnelstitch_geometry::camera::Camera;

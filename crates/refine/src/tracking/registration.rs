@@ -4,6 +4,8 @@
 //! correlation search → hypotheses → Gauss–Newton → candidates → choice
 //! ```
 
+use crate::comparison::mosaic_grid::pixel_size_m;
+use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
@@ -16,12 +18,10 @@ use crate::solver::stopping::Stopping;
 use crate::thresholds::registration::{MAX_HYPOTHESES, MEAN_HYPOTHESES, MIN_UNEXPLAINED};
 use crate::tracking::candidate::{Candidate, choose_candidate, sort_candidates, unexplained_share};
 use crate::tracking::correlation_search::{Hypothesis, log_likelihood, search_poses};
-use crate::tracking::mosaic_grid::pixel_size_m;
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::PosePrediction;
 use crate::tracking::reference_mosaic::ReferenceMosaic;
 use crate::tracking::search_grid::MAX_DEVIATION_SIGMA;
-use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use tunnelstitch_geometry::surface::viewing_distance;

@@ -7,6 +7,8 @@
 //! A frame that cannot be registered stays at the prior's prediction, and no other is compared with
 //! it.
 
+use crate::comparison::inconsistent_frames::{find_inconsistent_frames, known_relations};
+use crate::comparison::pairwise_ncc::compute_pairwise_ncc;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
@@ -22,8 +24,6 @@ use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::{PosePrediction, predict_pose};
 use crate::tracking::registration::{Effort, Registered, register_frame};
 use crate::tracking::windows::{LONG_WINDOW_STRIDE, solve_long_window, solve_sliding_window};
-use crate::validation::inconsistent_frames::{find_inconsistent_frames, known_relations};
-use crate::validation::pairwise_ncc::compute_pairwise_ncc;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::surface::Footprint;
 

@@ -1,5 +1,6 @@
 //! Search for aliases: gauge motions after which a frame matches the wall as well as it does now.
 
+use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
@@ -13,7 +14,6 @@ use crate::tracking::correlation_search::{
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::reference_mosaic::ReferenceMosaic;
 use crate::tracking::registration::MAX_DEVIATION_COST;
-use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use nalgebra::Vector2;
 use tunnelstitch_geometry::surface::{Footprint, GaugeMotion, gauge_component};
 use tunnelstitch_geometry::trajectory::Pose;

@@ -1,8 +1,8 @@
 //! Rejection of blurred frames.
 
+use crate::comparison::pairwise_ncc::PairNcc;
 use crate::model::rejection::RejectionReason;
 use crate::thresholds::pairwise_ncc::MIN_SHARPNESS_RATIO;
-use crate::validation::pairwise_ncc::PairNcc;
 
 /// Finds the frames that show less fine detail than the frames that they overlap.
 pub fn find_blurred_frames(pairs: &[PairNcc], frames: usize) -> Vec<(usize, RejectionReason)> {

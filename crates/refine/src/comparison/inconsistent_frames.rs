@@ -8,10 +8,10 @@
 //! itself within it is rejected frame by frame. The relation of a rig's cameras connects them as a
 //! pair does, if it is known as well.
 
+use crate::comparison::pairwise_ncc::PairNcc;
 use crate::model::context::EstimationContext;
 use crate::model::rejection::RejectionReason;
 use crate::thresholds::inconsistent_frames::{MAX_CONTRADICTING_SHARE, MAX_RELATION_SIGMA_PX};
-use crate::validation::pairwise_ncc::PairNcc;
 use tunnelstitch_geometry::surface::mean_radius_m;
 
 /// Finds the frames outside the largest group that pairs which show the same wall, or relations of

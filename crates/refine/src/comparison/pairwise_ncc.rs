@@ -6,6 +6,10 @@
 //! right poses correlate as well as the texture allows, others do not, and a low residual fused
 //! from several frames cannot hide it.
 
+use crate::comparison::mosaic_grid::{MosaicGrid, pixel_size_m};
+use crate::comparison::ncc_score::NccScore;
+use crate::comparison::overlaps::{Batch, Overlaps};
+use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
@@ -15,10 +19,6 @@ use crate::thresholds::pairwise_ncc::{
     STRIDE_PX,
 };
 use crate::tiles::residual_weighting::robust_correlation;
-use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
-use crate::tracking::ncc_score::NccScore;
-use crate::tracking::unwrapped_frame::UnwrappedFrame;
-use crate::validation::overlaps::{Batch, Overlaps};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
