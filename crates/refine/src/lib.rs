@@ -14,7 +14,7 @@
 //! | [`prescreen`](stages::prescreen) | rejects useless frames; first model of the light, sensor noise | [`tracking::prescreening`], [`tracking::first_light`] |
 //! | [`track`](stages::track) | registers one frame after another on the wall that its predecessors show; sliding windows | [`tracking`] |
 //! | [`correct_shading`](stages::correct_shading) | light that moves with the camera, from the overlaps | [`tunnelstitch_photometry`] |
-//! | [`validate_pairs`](stages::validate_pairs) | rejects frames outside the largest group that agrees pair by pair, and registers them again | [`comparison`] |
+//! | [`validate_pairs`](stages::validate_pairs) | rejects frames that contradict larger groups pair by pair, and registers them again | [`comparison`] |
 //! | [`solve`](stages::solve) | all frames together, at full size; then pairs are validated again | [`problem`], [`solver`] |
 //! | [`resolve_aliases`](stages::resolve_aliases) | moves frames to where the prior has them if they fit there as well | [`validation`] |
 //! | [`solve`](stages::solve), last | full size, dense samples; then jointly with the wall, if asked for | [`joint`] |

@@ -3,19 +3,29 @@
 //! A frame is an inlier if pairs that show the same wall connect it with most of the others, and if
 //! it does not contradict the inliers that it shares wall with. Agreement of neighbours is not
 //! enough: a group of frames can be right in itself and stand in the wrong place. Nor is a
-//! contradiction: of a pair that does not show the same wall only one frame need be wrong. So the
-//! largest group that agreeing pairs connect is believed against all others, and what contradicts
-//! itself within it is rejected frame by frame. The relation of a rig's cameras connects them as a
-//! pair does, if it is known as well.
+//! contradiction: of a pair that does not show the same wall only one frame need be wrong. So of
+//! two groups that agreeing pairs connect, the larger is believed against the smaller. The relation
+//! of a rig's cameras connects them as a pair does, if it is known as well.
 
-use crate::comparison::pairwise_ncc::PairNcc;
 use crate::model::context::EstimationContext;
 use crate::model::rejection::RejectionReason;
 use crate::thresholds::inconsistent_frames::{MAX_CONTRADICTING_SHARE, MAX_RELATION_SIGMA_PX};
 use tunnelstitch_geometry::surface::mean_radius_m;
 
-/// Finds the frames outside the largest group that pairs which show the same wall, or relations of
-/// a rig ([`known_relations`]), connect, and those within it that contradict it.
+/// Finds the frames that contradict others of a group at least as large as their own; groups are
+/// connected by pairs that show the same wall, or by relations of a rig ([`known_relations`]).
+pub fn find_contradictions(
+    pairs: &[PairNcc],
+    relations: &[(usize, usize)],
+    frames: usize,
+) -> Vec<(usize, RejectionReason)> {
+    let mut comparison = Comparison::new(pairs, relations, frames);
+    comparison.reject_contradicting();
+    comparison.into_rejections()
+}
+
+/// Finds the frames that contradict others ([`find_contradictions`]), and those of the rest outside
+/// their largest connected group.
 ///
 /// Frames that share no texture with any other are not judged.
 pub fn find_inconsistent_frames(
@@ -23,23 +33,10 @@ pub fn find_inconsistent_frames(
     relations: &[(usize, usize)],
     frames: usize,
 ) -> Vec<(usize, RejectionReason)> {
-    let mut comparison = Comparison {
-        pairs,
-        relations,
-        is_compared: vec![false; frames],
-        reasons: vec![None; frames],
-    };
-    for pair in pairs {
-        comparison.is_compared[pair.a] = true;
-        comparison.is_compared[pair.b] = true;
-    }
-    comparison.reject_groups();
+    let mut comparison = Comparison::new(pairs, relations, frames);
     comparison.reject_contradicting();
     comparison.reject_groups();
-    let reasons = comparison.reasons.into_iter().enumerate();
-    reasons
-        .filter_map(|(k, reason)| Some((k, reason?)))
-        .collect()
+    comparison.into_rejections()
 }
 
 /// The comparison of all frames.
@@ -52,40 +49,56 @@ struct Comparison<'c> {
     reasons: Vec<Option<RejectionReason>>,
 }
 
-impl Comparison<'_> {
+impl<'c> Comparison<'c> {
+    fn new(pairs: &'c [PairNcc], relations: &'c [(usize, usize)], frames: usize) -> Self {
+        let mut is_compared = vec![false; frames];
+        for pair in pairs {
+            (is_compared[pair.a], is_compared[pair.b]) = (true, true);
+        }
+        Self {
+            pairs,
+            relations,
+            is_compared,
+            reasons: vec![None; frames],
+        }
+    }
+
+    fn into_rejections(self) -> Vec<(usize, RejectionReason)> {
+        let reasons = self.reasons.into_iter().enumerate();
+        reasons
+            .filter_map(|(k, reason)| Some((k, reason?)))
+            .collect()
+    }
+
     fn is_inlier(&self, frame: usize) -> bool {
         self.is_compared[frame] && self.reasons[frame].is_none()
     }
 
-    /// Rejects the inliers outside their largest connected group.
-    fn reject_groups(&mut self) {
+    /// For each frame the first frame of its connected group of inliers, and the sizes of the
+    /// groups by their first frames.
+    fn groups(&self) -> (Vec<usize>, Vec<usize>) {
         let frames = self.reasons.len();
         let same_wall = self.pairs.iter().filter(|pair| !pair.contradicts);
         let same_wall = same_wall.map(|pair| (pair.a, pair.b));
         let connections = same_wall.chain(self.relations.iter().copied());
         let connections = connections.filter(|(a, b)| self.is_inlier(*a) && self.is_inlier(*b));
         let group = connected_components(connections, frames);
-        let judged: Vec<usize> = (0..frames).filter(|k| self.is_inlier(*k)).collect();
         let mut sizes = vec![0usize; frames];
-        for k in &judged {
-            sizes[group[*k]] += 1;
+        for k in (0..frames).filter(|k| self.is_inlier(*k)) {
+            sizes[group[k]] += 1;
         }
-        let largest = (0..frames).max_by_key(|k| (sizes[*k], std::cmp::Reverse(*k)));
-        let is_outside = |k: &usize| Some(group[*k]) != largest;
-        let is_inside = |k: usize| self.is_inlier(k) && !is_outside(&k);
-        let outside = judged.into_iter().filter(is_outside);
-        let reasons: Vec<(usize, RejectionReason)> = outside
-            .map(|k| {
+        (group, sizes)
+    }
+
+    /// Rejects the inliers outside their largest connected group.
+    fn reject_groups(&mut self) {
+        let (group, sizes) = self.groups();
+        let largest = (0..sizes.len()).max_by_key(|k| (sizes[*k], std::cmp::Reverse(*k)));
+        for k in 0..group.len() {
+            if self.is_inlier(k) && Some(group[k]) != largest {
                 let frames = sizes[group[k]];
-                let contradiction = self.worst_contradiction(k, is_inside);
-                (
-                    k,
-                    contradiction.unwrap_or(RejectionReason::Disconnected { frames }),
-                )
-            })
-            .collect();
-        for (k, reason) in reasons {
-            self.reasons[k] = Some(reason);
+                self.reasons[k] = Some(RejectionReason::Disconnected { frames });
+            }
         }
     }
 
@@ -99,16 +112,20 @@ impl Comparison<'_> {
         }
     }
 
-    /// The inlier with the largest share of its samples in contradicting pairs of inliers, if that
-    /// is more than [`MAX_CONTRADICTING_SHARE`].
+    /// The inlier with the largest share of its samples in pairs that contradict inliers of a group
+    /// at least as large as its own, if that is more than [`MAX_CONTRADICTING_SHARE`].
     fn most_contradicting(&self) -> Option<usize> {
         let frames = self.reasons.len();
+        let (group, sizes) = self.groups();
+        let size = |frame: usize| sizes[group[frame]];
         let (mut all, mut contradicting) = (vec![0.0; frames], vec![0.0; frames]);
         for pair in self.pairs {
             if self.is_inlier(pair.a) && self.is_inlier(pair.b) {
-                for frame in [pair.a, pair.b] {
+                for (frame, other) in [(pair.a, pair.b), (pair.b, pair.a)] {
                     all[frame] += pair.samples;
-                    contradicting[frame] += if pair.contradicts { pair.samples } else { 0.0 };
+                    if pair.contradicts && size(frame) <= size(other) {
+                        contradicting[frame] += pair.samples;
+                    }
                 }
             }
         }
@@ -218,7 +235,7 @@ mod tests {
     /// Two wrong frames that agree with each other, and contradict the last of the others in more
     /// of its samples than it contradicts of theirs.
     #[test]
-    fn the_largest_group_is_believed_against_its_frames_that_others_contradict() {
+    fn the_larger_group_is_believed_against_the_smaller() {
         let mut pairs = chain(0..9);
         pairs.push(pair(9, 10, 0.9));
         pairs.extend([pair(8, 9, 0.1), pair(8, 10, 0.0)]);

@@ -2,7 +2,7 @@
 //! blurred, registers rejected ones again, and solves.
 
 use crate::comparison::blurred_frames::find_blurred_frames;
-use crate::comparison::inconsistent_frames::{find_inconsistent_frames, known_relations};
+use crate::comparison::inconsistent_frames::{find_contradictions, known_relations};
 use crate::comparison::pairwise_ncc::compute_pairwise_ncc;
 use crate::error::RefineError;
 use crate::solver::solve_levels::solve_levels;
@@ -30,7 +30,7 @@ pub fn run<'a>(
     session.progress.start("check", MAX_PAIR_ITERATIONS);
     for iteration in 0..MAX_PAIR_ITERATIONS {
         let pairs = compute_pairwise_ncc(&context, finest, frames, &(0..count))?;
-        frames.reject(find_inconsistent_frames(&pairs, &relations, count));
+        frames.reject(find_contradictions(&pairs, &relations, count));
         frames.reject(find_blurred_frames(&pairs, count));
         if iteration + 1 == MAX_PAIR_ITERATIONS
             || !frames.outnumber_misplaced()
