@@ -7,6 +7,7 @@
 //! two groups that agreeing pairs connect, the larger is believed against the smaller. The relation
 //! of a rig's cameras connects them as a pair does, if it is known as well.
 
+use crate::comparison::pairwise_ncc::PairNcc;
 use crate::model::context::EstimationContext;
 use crate::model::rejection::RejectionReason;
 use crate::thresholds::inconsistent_frames::{MAX_CONTRADICTING_SHARE, MAX_RELATION_SIGMA_PX};
