@@ -1,10 +1,9 @@
 //! Manners of the command line: JSON, errors, help and colours are alike for all commands.
 
-use crate::support::{fail, first_frames, succeed, text, tunnelstitch};
+use crate::support::{fail, first_frames, succeed, text, tunnelstitch, with_input};
 use serde_json::Value;
-use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 /// The one JSON document that a command prints; nothing may follow it.
 #[track_caller]
@@ -185,19 +184,7 @@ fn a_hyphen_is_standard_input_or_output() {
     std::fs::write(&input, pixels).unwrap();
     let locate = ["locate", text(dir), "--points"];
     succeed(&[&locate[..], &[text(&input), "--out", text(&output)]].concat());
-    let mut child = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
-        .args([&locate[..], &["-", "--out", "-"]].concat())
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    child
-        .stdin
-        .take()
-        .unwrap()
-        .write_all(pixels.as_bytes())
-        .unwrap();
-    let printed = child.wait_with_output().unwrap();
+    let printed = with_input(&[&locate[..], &["-", "--out", "-"]].concat(), pixels);
     assert!(printed.status.success());
     assert_eq!(printed.stdout, std::fs::read(&output).unwrap());
 }

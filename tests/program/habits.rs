@@ -1,29 +1,10 @@
 //! Habits of people and programs: streams, folders, copies, clocks and axes.
 
-use crate::support::{edit, fail, first_frames, simulate, succeed, text, tunnelstitch};
+use crate::support::{edit, fail, first_frames, simulate, succeed, text, tunnelstitch, with_input};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
-use tunnelstitch::trajectory::{Pose, StampedPose, tum};
 
-/// Runs the program with a text as standard input.
-fn with_input(arguments: &[&str], input: &str) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
-        .args(arguments)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    child
-        .stdin
-        .take()
-        .unwrap()
-        .write_all(input.as_bytes())
-        .unwrap();
-    child.wait_with_output().unwrap()
-}
+use tunnelstitch::trajectory::{Pose, StampedPose, tum};
 
 /// All that `init` prints, and its survey.toml.
 fn init(folder: &Path) -> (String, String) {

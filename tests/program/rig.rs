@@ -1,6 +1,6 @@
 //! Surveys by rigs of several cameras.
 
-use crate::support::{edit, fail, json, simulate, succeed, text};
+use crate::support::{blur_pictures, edit, fail, json, simulate, succeed, text};
 use std::path::Path;
 use tunnelstitch::evaluate::wall_error;
 use tunnelstitch::survey::Survey;
@@ -123,4 +123,16 @@ fn rigs_that_are_incomplete_are_refused_with_the_camera() {
         message.contains("has 12 pictures") && message.contains("camera 1 (frames/camera1/*.png)"),
         "{message}"
     );
+}
+
+/// The frames of the moments that have not been tracked yet are not judged.
+#[test]
+fn a_rig_of_which_nothing_matches_ends_early() {
+    let dir = tempfile::tempdir().unwrap();
+    let (survey, out) = (simulated(dir.path()), dir.path().join("out"));
+    for camera in ["camera0", "camera1"] {
+        blur_pictures(&survey.join("frames").join(camera), 10.0);
+    }
+    let message = fail(&["refine", text(&survey), "--out", text(&out)], 4);
+    assert!(message.contains("it was not tried"), "{message}");
 }

@@ -1,6 +1,6 @@
 //! The verdict: whether a result may be used, and what it says where the model is wrong.
 
-use crate::support::{edit, fail, json, simulate, succeed, text, wall_px};
+use crate::support::{blur_pictures, edit, fail, json, simulate, succeed, text, wall_px};
 use std::path::Path;
 
 /// Poses of a TUM file.
@@ -52,10 +52,7 @@ fn a_survey_in_which_nothing_matches_ends_early() {
         &survey,
         &["--frames", "20", "--size", "160x120", "--seed", "4"],
     );
-    for frame in survey.join("frames").read_dir().unwrap() {
-        let path = frame.unwrap().path();
-        image::open(&path).unwrap().blur(8.0).save(&path).unwrap();
-    }
+    blur_pictures(&survey.join("frames"), 8.0);
     let message = fail(&["refine", text(&survey), "--out", text(&out)], 4);
     assert!(message.contains("it was not tried"), "{message}");
     let report = json(&out.join("refine.json"));

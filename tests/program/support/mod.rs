@@ -8,6 +8,7 @@ pub mod outputs;
 pub mod recorder;
 pub mod server;
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
@@ -66,6 +67,24 @@ pub fn tunnelstitch(arguments: &[&str]) -> Output {
         .expect("the program starts")
 }
 
+/// Runs the program with a text as standard input.
+pub fn with_input(arguments: &[&str], input: &str) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(input.as_bytes())
+        .unwrap();
+    child.wait_with_output().unwrap()
+}
+
 /// Runs the program and expects success; returns standard output.
 pub fn succeed(arguments: &[&str]) -> String {
     let output = tunnelstitch(arguments);
@@ -107,6 +126,14 @@ pub fn run_within(arguments: &[&str], seconds: u64) -> (Option<i32>, String) {
     let texts = [output.stdout, output.stderr];
     let text = String::from_utf8_lossy(&texts.concat()).into_owned();
     (output.status.code(), text)
+}
+
+/// Blurs all pictures in a folder, each with a Gaussian of `sigma` pixels.
+pub fn blur_pictures(folder: &Path, sigma: f32) {
+    for picture in folder.read_dir().unwrap() {
+        let path = picture.unwrap().path();
+        image::open(&path).unwrap().blur(sigma).save(&path).unwrap();
+    }
 }
 
 /// Simulates a survey into `out`; `options` are added to the defaults, but for 4 × 4 points per

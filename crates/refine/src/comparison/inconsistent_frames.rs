@@ -7,60 +7,81 @@
 //! two groups that agreeing pairs connect, the larger is believed against the smaller. The relation
 //! of a rig's cameras connects them as a pair does, if it is known as well.
 
-use crate::comparison::pairwise_ncc::PairNcc;
+use crate::comparison::pairwise_ncc::{PairNcc, compute_pairwise_ncc};
 use crate::model::context::EstimationContext;
+use crate::model::frame_states::FrameStates;
+use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::thresholds::inconsistent_frames::{MAX_CONTRADICTING_SHARE, MAX_RELATION_SIGMA_PX};
 use tunnelstitch_geometry::surface::mean_radius_m;
 
-/// Finds the frames that contradict others of a group at least as large as their own; groups are
-/// connected by pairs that show the same wall, or by relations of a rig ([`known_relations`]).
-pub fn find_contradictions(
-    pairs: &[PairNcc],
-    relations: &[(usize, usize)],
-    frames: usize,
-) -> Vec<(usize, RejectionReason)> {
-    let mut comparison = Comparison::new(pairs, relations, frames);
-    comparison.reject_contradicting();
-    comparison.into_rejections()
+/// The comparison of the first frames of a survey, or of all, at their present poses.
+pub struct FrameComparison {
+    /// Number of frames.
+    pub frames: usize,
+    /// Pairs of the inliers that share texture.
+    pub pairs: Vec<PairNcc>,
+    /// Frames that the relation of a rig's cameras connects.
+    relations: Vec<(usize, usize)>,
 }
 
-/// Finds the frames that contradict others ([`find_contradictions`]), and those of the rest outside
-/// their largest connected group.
-///
-/// Frames that share no texture with any other are not judged.
-pub fn find_inconsistent_frames(
-    pairs: &[PairNcc],
-    relations: &[(usize, usize)],
-    frames: usize,
-) -> Vec<(usize, RejectionReason)> {
-    let mut comparison = Comparison::new(pairs, relations, frames);
-    comparison.reject_contradicting();
-    comparison.reject_groups();
-    comparison.into_rejections()
+impl FrameComparison {
+    /// Compares the inliers among `states` with each other at a pyramid level.
+    ///
+    /// # Errors
+    /// [`ProblemError`]: a frame that cannot be read.
+    pub fn of(
+        context: &EstimationContext,
+        level: usize,
+        states: &FrameStates,
+    ) -> Result<Self, ProblemError> {
+        let frames = states.estimates.len();
+        Ok(Self {
+            frames,
+            pairs: compute_pairwise_ncc(context, level, states)?,
+            relations: known_relations(context, frames),
+        })
+    }
+
+    /// The frames that contradict others of a group at least as large as their own; groups are
+    /// connected by pairs that show the same wall, or by relations of a rig.
+    pub fn contradictions(&self) -> Vec<(usize, RejectionReason)> {
+        let mut judgement = Judgement::new(self);
+        judgement.reject_contradicting();
+        judgement.into_rejections()
+    }
+
+    /// The frames that contradict others ([`Self::contradictions`]), and those of the rest outside
+    /// their largest connected group.
+    ///
+    /// Frames that share no texture with any other are not judged.
+    pub fn inconsistencies(&self) -> Vec<(usize, RejectionReason)> {
+        let mut judgement = Judgement::new(self);
+        judgement.reject_contradicting();
+        judgement.reject_groups();
+        judgement.into_rejections()
+    }
 }
 
-/// The comparison of all frames.
-struct Comparison<'c> {
-    pairs: &'c [PairNcc],
-    relations: &'c [(usize, usize)],
+/// The judgement of compared frames.
+struct Judgement<'c> {
+    comparison: &'c FrameComparison,
     /// True for frames that share texture with others.
     is_compared: Vec<bool>,
     /// The reasons of those rejected so far.
     reasons: Vec<Option<RejectionReason>>,
 }
 
-impl<'c> Comparison<'c> {
-    fn new(pairs: &'c [PairNcc], relations: &'c [(usize, usize)], frames: usize) -> Self {
-        let mut is_compared = vec![false; frames];
-        for pair in pairs {
+impl<'c> Judgement<'c> {
+    fn new(comparison: &'c FrameComparison) -> Self {
+        let mut is_compared = vec![false; comparison.frames];
+        for pair in &comparison.pairs {
             (is_compared[pair.a], is_compared[pair.b]) = (true, true);
         }
         Self {
-            pairs,
-            relations,
+            comparison,
             is_compared,
-            reasons: vec![None; frames],
+            reasons: vec![None; comparison.frames],
         }
     }
 
@@ -78,14 +99,18 @@ impl<'c> Comparison<'c> {
     /// For each frame the first frame of its connected group of inliers, and the sizes of the
     /// groups by their first frames.
     fn groups(&self) -> (Vec<usize>, Vec<usize>) {
-        let frames = self.reasons.len();
-        let same_wall = self.pairs.iter().filter(|pair| !pair.contradicts);
+        let FrameComparison {
+            frames,
+            pairs,
+            relations,
+        } = self.comparison;
+        let same_wall = pairs.iter().filter(|pair| !pair.contradicts);
         let same_wall = same_wall.map(|pair| (pair.a, pair.b));
-        let connections = same_wall.chain(self.relations.iter().copied());
+        let connections = same_wall.chain(relations.iter().copied());
         let connections = connections.filter(|(a, b)| self.is_inlier(*a) && self.is_inlier(*b));
-        let group = connected_components(connections, frames);
-        let mut sizes = vec![0usize; frames];
-        for k in (0..frames).filter(|k| self.is_inlier(*k)) {
+        let group = connected_components(connections, *frames);
+        let mut sizes = vec![0usize; *frames];
+        for k in (0..*frames).filter(|k| self.is_inlier(*k)) {
             sizes[group[k]] += 1;
         }
         (group, sizes)
@@ -108,8 +133,7 @@ impl<'c> Comparison<'c> {
     /// [`MAX_CONTRADICTING_SHARE`] for every frame.
     fn reject_contradicting(&mut self) {
         while let Some(worst) = self.most_contradicting() {
-            let contradiction = self.worst_contradiction(worst, |k| self.is_inlier(k));
-            self.reasons[worst] = contradiction;
+            self.reasons[worst] = self.worst_contradiction(worst);
         }
     }
 
@@ -120,7 +144,7 @@ impl<'c> Comparison<'c> {
         let (group, sizes) = self.groups();
         let size = |frame: usize| sizes[group[frame]];
         let (mut all, mut contradicting) = (vec![0.0; frames], vec![0.0; frames]);
-        for pair in self.pairs {
+        for pair in &self.comparison.pairs {
             if self.is_inlier(pair.a) && self.is_inlier(pair.b) {
                 for (frame, other) in [(pair.a, pair.b), (pair.b, pair.a)] {
                     all[frame] += pair.samples;
@@ -136,28 +160,24 @@ impl<'c> Comparison<'c> {
         frames.max_by(|a, b| share(a).total_cmp(&share(b)))
     }
 
-    /// The pair in which a frame contradicts one of certain others most, as the reason to reject
-    /// it.
-    fn worst_contradiction(
-        &self,
-        frame: usize,
-        is_other: impl Fn(usize) -> bool,
-    ) -> Option<RejectionReason> {
-        let contradicting = self.pairs.iter().filter(|pair| pair.contradicts);
+    /// The pair in which a frame contradicts another inlier most, as the reason to reject it.
+    fn worst_contradiction(&self, frame: usize) -> Option<RejectionReason> {
+        let pairs = self.comparison.pairs.iter();
+        let contradicting = pairs.filter(|pair| pair.contradicts);
         let against = contradicting.filter_map(|pair| match pair {
             pair if pair.a == frame => Some((pair.b, pair.correlation)),
             pair if pair.b == frame => Some((pair.a, pair.correlation)),
             _ => None,
         });
-        let against = against.filter(|(other, _)| is_other(*other));
+        let against = against.filter(|(other, _)| self.is_inlier(*other));
         let (frame, correlation) = against.min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some(RejectionReason::Contradicts { frame, correlation })
     }
 }
 
-/// Pairs of frames of one moment whose relation is known well enough to connect them: if its σ
-/// displaces the wall in the picture by no more than [`MAX_RELATION_SIGMA_PX`].
-pub fn known_relations(context: &EstimationContext) -> Vec<(usize, usize)> {
+/// Pairs among the first frames, of one moment, whose relation is known well enough to connect
+/// them: if its σ displaces the wall in the picture by no more than [`MAX_RELATION_SIGMA_PX`].
+fn known_relations(context: &EstimationContext, frames: usize) -> Vec<(usize, usize)> {
     let Some(rig) = &context.prior.rig else {
         return Vec::new();
     };
@@ -167,24 +187,26 @@ pub fn known_relations(context: &EstimationContext) -> Vec<(usize, usize)> {
         let focal_px = context.cameras.of(*k).vertical_focal_px();
         context.prior.is_related(*k) && focal_px * sigma_rad <= MAX_RELATION_SIGMA_PX
     };
-    let later = (1..context.prior.initial.len()).filter(is_known);
+    let later = (1..frames).filter(is_known);
     later.map(|k| (k - 1, k)).collect()
 }
 
 /// Connected components of the graph of pairs: for each frame the first frame of its component.
 fn connected_components(pairs: impl Iterator<Item = (usize, usize)>, frames: usize) -> Vec<usize> {
-    let mut group: Vec<usize> = (0..frames).collect();
-    for (a, b) in pairs {
-        let (a, b) = (group[a], group[b]);
-        if a != b {
-            let (first, other) = (a.min(b), a.max(b));
-            group
-                .iter_mut()
-                .filter(|g| **g == other)
-                .for_each(|g| *g = first);
+    // Each frame's way to the first one, shortened as it is walked (union–find).
+    let mut earlier: Vec<usize> = (0..frames).collect();
+    let first = |mut frame: usize, earlier: &mut Vec<usize>| {
+        while earlier[frame] != frame {
+            earlier[frame] = earlier[earlier[frame]];
+            frame = earlier[frame];
         }
+        frame
+    };
+    for (a, b) in pairs {
+        let (a, b) = (first(a, &mut earlier), first(b, &mut earlier));
+        earlier[a.max(b)] = a.min(b);
     }
-    group
+    (0..frames).map(|k| first(k, &mut earlier)).collect()
 }
 
 #[cfg(test)]
@@ -193,7 +215,20 @@ mod tests {
     use crate::thresholds::pairwise_ncc::MIN_CORRELATION;
 
     fn find(pairs: &[PairNcc], frames: usize) -> Vec<(usize, RejectionReason)> {
-        find_inconsistent_frames(pairs, &[], frames)
+        find_with_relations(pairs, &[], frames)
+    }
+
+    fn find_with_relations(
+        pairs: &[PairNcc],
+        relations: &[(usize, usize)],
+        frames: usize,
+    ) -> Vec<(usize, RejectionReason)> {
+        let comparison = FrameComparison {
+            frames,
+            pairs: pairs.to_vec(),
+            relations: relations.to_vec(),
+        };
+        comparison.inconsistencies()
     }
 
     fn pair(a: usize, b: usize, correlation: f64) -> PairNcc {
@@ -266,6 +301,6 @@ mod tests {
     fn the_relation_of_a_rig_connects_groups_of_frames() {
         let pairs = [chain(0..6), chain(6..10)].concat();
         assert_eq!(find(&pairs, 10).len(), 4);
-        assert!(find_inconsistent_frames(&pairs, &[(2, 7)], 10).is_empty());
+        assert!(find_with_relations(&pairs, &[(2, 7)], 10).is_empty());
     }
 }

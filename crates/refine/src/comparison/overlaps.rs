@@ -5,7 +5,6 @@ use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::samples::footprints::footprint;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
-use std::ops::Range;
 use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Footprint;
@@ -13,11 +12,10 @@ use tunnelstitch_geometry::surface::Footprint;
 /// Frames compared at once: bounds the memory.
 const BATCH: usize = 32;
 
-/// The parts of the wall that the inliers among some consecutive frames see.
+/// The parts of the wall that the inliers see.
 pub struct Overlaps {
-    /// The footprint of every frame; None for rejected ones and those outside the range.
+    /// The footprint of every frame; None for rejected ones.
     pub footprints: Vec<Option<Footprint>>,
-    frame_range: Range<usize>,
     perimeter_m: f64,
 }
 
@@ -30,7 +28,7 @@ pub struct Batch {
 }
 
 impl Overlaps {
-    /// The overlaps of the inliers of `frame_range` at their present poses, through `cameras`.
+    /// The overlaps of the inliers at their present poses, through `cameras`.
     ///
     /// # Errors
     /// [`ProblemError::Placement`].
@@ -38,10 +36,9 @@ impl Overlaps {
         context: &EstimationContext,
         cameras: &Cameras,
         states: &FrameStates,
-        frame_range: &Range<usize>,
     ) -> Result<Self, ProblemError> {
         let footprints = (0..states.estimates.len()).par_map(|k| {
-            if frame_range.contains(&k) && states.rejections[k].is_none() {
+            if states.rejections[k].is_none() {
                 let camera = cameras.of(k).with_sweep(&states.sweep(context, k));
                 footprint(context, &camera, k, &states.estimates[k].pose).map(Some)
             } else {
@@ -50,15 +47,14 @@ impl Overlaps {
         });
         Ok(Self {
             footprints: footprints.into_iter().collect::<Result<_, _>>()?,
-            frame_range: frame_range.clone(),
             perimeter_m: context.surface.perimeter_m(),
         })
     }
 
     /// The frames in batches, each with those of its later partners for which `is_wanted` is true.
     pub fn batches(&self, is_wanted: impl Fn(usize, usize) -> bool) -> impl Iterator<Item = Batch> {
-        self.frame_range.clone().step_by(BATCH).map(move |start| {
-            let frames = start..(start + BATCH).min(self.frame_range.end);
+        (0..self.footprints.len()).step_by(BATCH).map(move |start| {
+            let frames = start..(start + BATCH).min(self.footprints.len());
             let partners: Vec<(usize, Vec<usize>)> = frames
                 .map(|a| {
                     let mut partners = self.later_partners(a);
@@ -82,7 +78,7 @@ impl Overlaps {
         let Some(own) = &self.footprints[a] else {
             return Vec::new();
         };
-        let end = (a + MAX_OVERLAP_DISTANCE_FRAMES + 1).min(self.frame_range.end);
+        let end = (a + MAX_OVERLAP_DISTANCE_FRAMES + 1).min(self.footprints.len());
         let overlaps = |other: &Footprint| other.overlaps(own, self.perimeter_m);
         (a + 1..end)
             .filter(|b| self.footprints[*b].as_ref().is_some_and(overlaps))

@@ -21,7 +21,6 @@ use crate::thresholds::pairwise_ncc::{
 use crate::tiles::residual_weighting::robust_correlation;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Footprint;
 
@@ -43,7 +42,7 @@ pub struct PairNcc {
     pub sharpness_ratio: Option<f64>,
 }
 
-/// Compares those of some consecutive frames that are inliers and overlap: at pyramid level
+/// Compares those frames that are inliers and overlap: at pyramid level
 /// `level`, in windows that hold a brick or two, and in finest detail.
 ///
 /// The coarse comparison tells whether they show the same wall. The fine one is used only where
@@ -61,7 +60,6 @@ pub fn compute_pairwise_ncc(
     context: &EstimationContext,
     level: usize,
     states: &FrameStates,
-    frame_range: &Range<usize>,
 ) -> Result<Vec<PairNcc>, ProblemError> {
     let any = |_, _| true;
     let coarse = Comparison {
@@ -74,8 +72,8 @@ pub fn compute_pairwise_ncc(
         window_px: FINE_WINDOW_PX,
         with_outliers: true,
     };
-    let of_coarse = compare_pairs(context, coarse, states, frame_range, &any)?;
-    let of_fine = by_pair(compare_pairs(context, fine, states, frame_range, &any)?);
+    let of_coarse = compare_pairs(context, coarse, states, &any)?;
+    let of_fine = by_pair(compare_pairs(context, fine, states, &any)?);
     let mut pairs: Vec<PairNcc> = of_coarse
         .into_iter()
         .filter_map(|coarse| {
@@ -103,7 +101,7 @@ pub fn compute_pairwise_ncc(
         ..coarse
     };
     let again = |a, b| contradicting.contains(&(a, b));
-    let compared = compare_pairs(context, without_outliers, states, frame_range, &again)?;
+    let compared = compare_pairs(context, without_outliers, states, &again)?;
     let compared = by_pair(compared);
     // Where little is left, and that agrees, the pair says nothing.
     pairs.retain_mut(|pair| match compared.get(&(pair.a, pair.b)) {
@@ -146,7 +144,6 @@ fn compare_pairs(
     context: &EstimationContext,
     comparison: Comparison,
     states: &FrameStates,
-    frame_range: &Range<usize>,
     is_wanted: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Vec<Compared>, ProblemError> {
     let Comparison {
@@ -155,7 +152,7 @@ fn compare_pairs(
         with_outliers,
     } = comparison;
     let cameras = context.cameras.at_level(level);
-    let overlaps = Overlaps::of(context, &cameras, states, frame_range)?;
+    let overlaps = Overlaps::of(context, &cameras, states)?;
     let mut pairs = Vec::new();
     let mut unwrapped_frames: BTreeMap<usize, UnwrappedFrame> = BTreeMap::new();
     for Batch { partners, needed } in overlaps.batches(is_wanted) {
@@ -288,9 +285,8 @@ mod tests {
 
     /// Compares these frames at these poses.
     fn compare_frames(wall: &TestWall, pictures: Vec<GreyImage>, poses: &[Pose]) -> Vec<PairNcc> {
-        let all = 0..poses.len();
         with_context(wall, pictures, poses, |context, states| {
-            compute_pairwise_ncc(context, 0, states, &all).unwrap()
+            compute_pairwise_ncc(context, 0, states).unwrap()
         })
     }
 

@@ -111,15 +111,7 @@ impl RejectionReason {
 
     /// True if the frame may register successfully among other neighbours.
     pub fn is_retriable(&self) -> bool {
-        matches!(
-            self,
-            Self::NoMatch { .. }
-                | Self::Ambiguous { .. }
-                | Self::Contradicts { .. }
-                | Self::Disagrees { .. }
-                | Self::Misaligned { .. }
-                | Self::Disconnected { .. }
-        )
+        matches!(self, Self::NoMatch { .. } | Self::Ambiguous { .. }) || self.is_misplaced()
     }
 }
 

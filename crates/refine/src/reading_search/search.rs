@@ -16,7 +16,7 @@ const MIN_PAIRS: usize = 4;
 /// to twenty.
 const MAX_DEFICIT_NATS: f64 = 3.0;
 /// Standard errors by which the evidence of pairs for the best reading exceeds that for another one
-/// that it is told from: the 95 % quantile of a normal distribution.
+/// that it is distinguished from: the 95 % quantile of a normal distribution.
 const MIN_TOLD_SIGMAS: f64 = 1.645;
 /// Evidence of a pair that speaks for poses of other frames, nats: half of that by which its steps
 /// differ at least.
@@ -47,7 +47,7 @@ struct Found<'r> {
 }
 
 impl Found<'_> {
-    /// True if a reading that has more evidence is told from this one: by its odds, and by the
+    /// True if a reading that has more evidence is distinguished from this one: by its odds, and by the
     /// evidence of pairs, which differs by more than it scatters (Q. H. Vuong, "Likelihood ratio
     /// tests for model selection and non-nested hypotheses", Econometrica 57, 1989).
     fn is_told_from(&self, best: &Self) -> bool {
@@ -213,7 +213,7 @@ fn compare<'r>(
     }))
 }
 
-/// The readings found, the most probable first, without those that it is told from.
+/// The readings found, the most probable first, without those that it is distinguished from.
 fn name(mut found: Vec<Found>) -> Option<FittingReadings> {
     found.sort_by(|a, b| {
         let by_odds = b.log_odds.total_cmp(&a.log_odds);
@@ -271,7 +271,7 @@ mod tests {
         assert_eq!(steady.log_odds, mixed.log_odds);
         // A reading that is improbable from the beginning needs more.
         assert!(found(&rare, &mixed.pair_nats).is_told_from(&best));
-        // Within odds of one to twenty, nothing is told.
+        // Within odds of one to twenty, nothing is distinguished.
         assert!(!found(&usual, &[29.8; 8]).is_told_from(&best));
     }
 }

@@ -1,7 +1,6 @@
 //! Stage: states the uncertainty and the verdict of every frame, and writes the report.
 
-use crate::comparison::inconsistent_frames::{find_inconsistent_frames, known_relations};
-use crate::comparison::pairwise_ncc::compute_pairwise_ncc;
+use crate::comparison::inconsistent_frames::FrameComparison;
 use crate::error::RefineError;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::{FrameStates, majority};
@@ -141,10 +140,8 @@ fn reject_inconsistent(
     context: &EstimationContext,
     state: &mut PipelineState,
 ) -> Result<(), ProblemError> {
-    let (count, finest) = (setup.count(), setup.handover_level());
-    let pairs = compute_pairwise_ncc(context, finest, &state.frames, &(0..count))?;
-    let relations = known_relations(context);
-    for (frame, rejection) in find_inconsistent_frames(&pairs, &relations, count) {
+    let comparison = FrameComparison::of(context, setup.handover_level(), &state.frames)?;
+    for (frame, rejection) in comparison.inconsistencies() {
         state.frames.rejections[frame].get_or_insert(rejection);
     }
     Ok(())

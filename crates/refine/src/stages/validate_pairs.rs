@@ -2,8 +2,7 @@
 //! blurred, registers rejected ones again, and solves.
 
 use crate::comparison::blurred_frames::find_blurred_frames;
-use crate::comparison::inconsistent_frames::{find_contradictions, known_relations};
-use crate::comparison::pairwise_ncc::compute_pairwise_ncc;
+use crate::comparison::inconsistent_frames::FrameComparison;
 use crate::error::RefineError;
 use crate::solver::solve_levels::solve_levels;
 use crate::stages::session::Session;
@@ -23,15 +22,14 @@ pub fn run<'a>(
 ) -> Result<Estimation<'a>, RefineError> {
     let state = &mut estimation.state;
     let context = setup.context(state);
-    let (count, options) = (setup.count(), setup.options);
+    let options = setup.options;
     let (coarsest, finest) = (setup.coarsest_level(), setup.handover_level());
-    let relations = known_relations(&context);
     let frames = &mut state.frames;
     session.progress.start("check", MAX_PAIR_ITERATIONS);
     for iteration in 0..MAX_PAIR_ITERATIONS {
-        let pairs = compute_pairwise_ncc(&context, finest, frames, &(0..count))?;
-        frames.reject(find_contradictions(&pairs, &relations, count));
-        frames.reject(find_blurred_frames(&pairs, count));
+        let comparison = FrameComparison::of(&context, finest, frames)?;
+        frames.reject(comparison.contradictions());
+        frames.reject(find_blurred_frames(&comparison.pairs, comparison.frames));
         if iteration + 1 == MAX_PAIR_ITERATIONS
             || !frames.outnumber_misplaced()
             || register_rejected(&context, options, frames)? == 0

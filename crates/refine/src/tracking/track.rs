@@ -7,8 +7,7 @@
 //! A frame that cannot be registered stays at the prior's prediction, and no other is compared with
 //! it.
 
-use crate::comparison::inconsistent_frames::{find_contradictions, known_relations};
-use crate::comparison::pairwise_ncc::compute_pairwise_ncc;
+use crate::comparison::inconsistent_frames::FrameComparison;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
@@ -152,14 +151,8 @@ impl Tracking {
         options: &RefineOptions,
     ) -> Result<bool, ProblemError> {
         let mut states = self.tracked_states();
-        let count = states.estimates.len();
         let level = options.handover_level(context.cameras.shorter_side());
-        let pairs = compute_pairwise_ncc(context, level, &states, &(0..count))?;
-        states.reject(find_contradictions(
-            &pairs,
-            &known_relations(context),
-            count,
-        ));
+        states.reject(FrameComparison::of(context, level, &states)?.contradictions());
         Ok(states.has_majority())
     }
 

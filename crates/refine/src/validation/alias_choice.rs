@@ -9,8 +9,7 @@
 //! clearly have it a period away, as other frames have shown it, it is ambiguous, too.
 
 use crate::model::prior::Prior;
-use crate::thresholds::aliasing::MAX_ITERATIONS;
-use crate::thresholds::aliasing::MAX_PERIOD_DIFFERENCE;
+use crate::thresholds::aliasing::{MAX_ITERATIONS, MAX_PERIOD_DIFFERENCE};
 use tunnelstitch_geometry::surface::{Gauge, GaugeMotion};
 use tunnelstitch_geometry::trajectory::{JitterModel, Pose};
 
