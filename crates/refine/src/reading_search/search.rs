@@ -47,8 +47,8 @@ struct Found<'r> {
 }
 
 impl Found<'_> {
-    /// True if a reading that has more evidence is distinguished from this one: by its odds, and by the
-    /// evidence of pairs, which differs by more than it scatters (Q. H. Vuong, "Likelihood ratio
+    /// True if a reading that has more evidence is distinguished from this one: by its odds, and by
+    /// the evidence of pairs, which differs by more than it scatters (Q. H. Vuong, "Likelihood ratio
     /// tests for model selection and non-nested hypotheses", Econometrica 57, 1989).
     fn is_told_from(&self, best: &Self) -> bool {
         if best.log_odds - self.log_odds <= MAX_DEFICIT_NATS {
