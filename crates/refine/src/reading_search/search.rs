@@ -48,9 +48,9 @@ struct Found<'r> {
 
 impl Found<'_> {
     /// True if a reading that has more evidence is distinguished from this one: by its odds, and by
-    /// the evidence of pairs, which differs by more than it scatters (Q. H. Vuong, "Likelihood ratio
-    /// tests for model selection and non-nested hypotheses", Econometrica 57, 1989).
-    fn is_told_from(&self, best: &Self) -> bool {
+    /// the evidence of pairs, which differs by more than it scatters (Q. H. Vuong, "Likelihood
+    /// ratio tests for model selection and non-nested hypotheses", Econometrica 57, 1989).
+    fn is_distinguished_from(&self, best: &Self) -> bool {
         if best.log_odds - self.log_odds <= MAX_DEFICIT_NATS {
             return false;
         }
@@ -220,7 +220,7 @@ fn name(mut found: Vec<Found>) -> Option<FittingReadings> {
         by_odds.then(a.reading.changes.cmp(&b.reading.changes))
     });
     let best = found.first()?;
-    let named = found.iter().filter(|one| !one.is_told_from(best));
+    let named = found.iter().filter(|one| !one.is_distinguished_from(best));
     Some(FittingReadings {
         readings: named.map(|one| one.reading.remedy.clone()).collect(),
         fitting: best.fitting,
@@ -267,11 +267,11 @@ mod tests {
         let best = found(&usual, &[30.0; 8]);
         let steady = found(&usual, &[29.0; 8]);
         let mixed = found(&usual, &[24.0, 34.0, 25.0, 33.0, 26.0, 34.0, 24.0, 32.0]);
-        assert!(steady.is_told_from(&best) && !mixed.is_told_from(&best));
+        assert!(steady.is_distinguished_from(&best) && !mixed.is_distinguished_from(&best));
         assert_eq!(steady.log_odds, mixed.log_odds);
         // A reading that is improbable from the beginning needs more.
-        assert!(found(&rare, &mixed.pair_nats).is_told_from(&best));
+        assert!(found(&rare, &mixed.pair_nats).is_distinguished_from(&best));
         // Within odds of one to twenty, nothing is distinguished.
-        assert!(!found(&usual, &[29.8; 8]).is_told_from(&best));
+        assert!(!found(&usual, &[29.8; 8]).is_distinguished_from(&best));
     }
 }
