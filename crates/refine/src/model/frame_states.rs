@@ -31,6 +31,14 @@ impl FrameStates {
         }
     }
 
+    /// Takes the exposures as given again: those of normalised frames are not those of the
+    /// pictures.
+    pub fn forget_exposures(&mut self) {
+        for estimate in &mut self.estimates {
+            *estimate = FrameEstimate::at(estimate.pose);
+        }
+    }
+
     /// The window of all frames, all estimated; rejected frames from the prior alone.
     pub fn window(&self) -> FrameWindow<'_> {
         let all = 0..self.estimates.len();

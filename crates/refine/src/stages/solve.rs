@@ -4,7 +4,6 @@ use crate::error::RefineError;
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::options::{Photometry, RefineOptions};
-use crate::parameters::frame_estimate::FrameEstimate;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::hidden_bands::find_hidden_bands;
 use crate::solver::argmin_glue::{self, Observation};
@@ -179,9 +178,7 @@ fn correct_light(
     if let Some(noise) = found {
         state.noise = noise;
         if light.is_none() {
-            state.frames.estimates = (state.frames.estimates.iter())
-                .map(|estimate| FrameEstimate::at(estimate.pose))
-                .collect();
+            state.frames.forget_exposures();
         }
         let context = setup.context(state);
         let levels = setup.handover_level()..=setup.coarsest_level();

@@ -107,6 +107,8 @@ const MIN_RESIDUALS_PER_BIN: u64 = 100;
 /// Least σ of the noise model, grey levels: rounding to 8 bits, `1/√12` = 0.29, of which bilinear
 /// interpolation leaves two thirds.
 const MIN_SIGMA_GREY: f64 = 0.2;
+/// Updates of the fit of the noise model: it changes by less than a thousandth in the last ones.
+const FIT_ITERATIONS: usize = 200;
 
 /// Counts of residual magnitudes by gradient of the texture, to which the noise model is fitted.
 #[derive(Clone, Debug)]
@@ -142,41 +144,78 @@ impl NoiseHistogram {
         self
     }
 
-    /// Fits `v(g)` to the robust variance `(1.4826 · median |e|)²` of each gradient bin, by least
-    /// squares weighted by the counts over the variances squared (their sampling variance).
+    /// Fits `v(g)` to the robust variances y = `(1.4826 · median |e|)²` of the gradient bins, by
+    /// maximum likelihood for normal residuals, i.e. the least `Σ n (y/v + ln v)` with n the counts.
+    ///
+    /// Least squares weighted by the sampling variance `2 y²/n` would follow the bins of which the
+    /// residuals happen to be smallest (a burnt sky, where all frames are alike) however few they
+    /// are, and the residuals of all others would be rejected. The update multiplies each parameter
+    /// by the square root of the ratio of the two parts of its derivative: no step raises the sum,
+    /// and parameters stay positive.
+    ///
+    /// Source: C. Févotte, N. Bertin, J.-L. Durrieu, "Nonnegative matrix factorization with the
+    /// Itakura-Saito divergence", Neural Computation 21(3), 2009, equation 4.3 and section 4 (with
+    /// the exponent 1/2).
     pub fn fit(&self) -> NoiseModel {
-        // Sums of 1, x, x², y, xy with x = g², y = variance.
-        let mut m = [0.0f64; 5];
-        for (row, counts) in self.counts.chunks_exact(RESIDUAL_BINS).enumerate() {
-            let total: u64 = counts.iter().sum();
-            if total < MIN_RESIDUALS_PER_BIN {
-                continue;
-            }
-            let x = gradient_square(row);
-            let y = (MAD_TO_SIGMA * median(counts, total))
-                .max(MIN_SIGMA_GREY)
-                .powi(2);
-            let w = total as f64 / (y * y);
-            for (sum, term) in m.iter_mut().zip([1.0, x, x * x, y, x * y]) {
-                *sum += w * term;
-            }
+        let variances = self.variances();
+        let count: f64 = variances.iter().map(|v| v.count).sum();
+        if count == 0.0 {
+            return NoiseModel {
+                floor: 1.0,
+                steepness: 0.0,
+            };
         }
-        let determinant = m[0] * m[2] - m[1] * m[1];
-        let steepness = if determinant > 1e-9 * m[0] * m[2] {
-            ((m[0] * m[4] - m[1] * m[3]) / determinant).max(0.0)
-        } else {
-            0.0
+        let mean = |of: fn(&GradientVariance) -> f64| {
+            variances.iter().map(|v| v.count * of(v)).sum::<f64>() / count
         };
-        let floor = if m[0] > 0.0 {
-            (m[3] - steepness * m[1]) / m[0]
-        } else {
-            1.0
-        };
+        let mut floor = mean(|v| v.variance) / 2.0;
+        let mut steepness = floor / mean(|v| v.gradient_square);
+        for _ in 0..FIT_ITERATIONS {
+            // Σ n y/v² and Σ n/v, alone and times g².
+            let mut sums = [0.0f64; 4];
+            for bin in &variances {
+                let v = floor + steepness * bin.gradient_square;
+                let (falling, rising) = (bin.count * bin.variance / (v * v), bin.count / v);
+                let g2 = bin.gradient_square;
+                for (sum, term) in sums.iter_mut().zip([falling, rising, falling * g2, rising * g2])
+                {
+                    *sum += term;
+                }
+            }
+            floor *= (sums[0] / sums[1]).sqrt();
+            steepness *= (sums[2] / sums[3]).sqrt();
+        }
         NoiseModel {
             floor: floor.max(MIN_SIGMA_GREY * MIN_SIGMA_GREY) as f32,
             steepness: steepness as f32,
         }
     }
+
+    /// The robust variances of the gradient bins that hold enough residuals.
+    fn variances(&self) -> Vec<GradientVariance> {
+        let rows = self.counts.chunks_exact(RESIDUAL_BINS).enumerate();
+        rows.filter_map(|(row, counts)| {
+            let total: u64 = counts.iter().sum();
+            (total >= MIN_RESIDUALS_PER_BIN).then(|| GradientVariance {
+                gradient_square: gradient_square(row),
+                count: total as f64,
+                variance: (MAD_TO_SIGMA * median(counts, total))
+                    .max(MIN_SIGMA_GREY)
+                    .powi(2),
+            })
+        })
+        .collect()
+    }
+}
+
+/// Variance of the residuals of a gradient bin.
+struct GradientVariance {
+    /// g², grey levels² per sample².
+    gradient_square: f64,
+    /// Number of residuals.
+    count: f64,
+    /// Robust variance, grey levels².
+    variance: f64,
 }
 
 impl NoiseHistogram {

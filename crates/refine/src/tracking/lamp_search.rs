@@ -32,10 +32,14 @@ pub fn find_lamp(
     let before = context.frames.light();
     let is_normalised = matches!(before, Light::Normalised);
     let dark = LightModel::present(context);
-    if is_normalised {
+    let views = if is_normalised {
         context.frames.set_light(Light::Even);
-    }
-    let views = TileViews::observe(context, options, frames)?;
+        let mut seen = frames.clone();
+        seen.forget_exposures();
+        TileViews::observe(context, options, &seen)?
+    } else {
+        TileViews::observe(context, options, frames)?
+    };
     let noise = median_noise(context)?;
     let lamp = lamp_beside(dark, &views, context, options);
     match lamp.filter(|(_, found)| found.variance.sqrt() < noise) {
