@@ -15,7 +15,7 @@
 
 use super::grey::GreyImage;
 use super::noise::noise_sigma;
-use super::windows::window_means;
+use super::windows::{window_means, window_moments};
 
 /// Half height of the window of the mean over the frame's shorter side: a standard deviation of a
 /// 72nd, for two passes.
@@ -56,15 +56,14 @@ pub fn normalise_locally(image: &GreyImage) -> GreyImage {
     let means = |values: &[f32], window| window_means(values, width, window);
     let mean = means(&means(&known, mean_window), mean_window);
     let detail: Vec<f32> = known.iter().zip(&mean).map(|(v, m)| v - m).collect();
-    let squares: Vec<f32> = detail.iter().map(|d| d * d).collect();
-    let variance = means(&squares, [half_side; 2]);
+    let moments = window_moments(&detail, width, [half_side; 2]);
     let noise = noise_sigma(image).map_or(MIN_NOISE_GREY, |sigma| sigma as f32);
     let floor = NOISE_WEIGHT * noise.max(MIN_NOISE_GREY);
     let clipped = means(&clipped, mean_window);
-    let normalised = detail.iter().zip(variance.iter().zip(&clipped));
-    let normalised = normalised.map(|(d, (variance, clipped))| {
+    let normalised = detail.iter().zip(moments.iter().zip(&clipped));
+    let normalised = normalised.map(|(d, (of, clipped))| {
         if *clipped < MAX_CLIPPED_SHARE {
-            MIDDLE_GREY + SPREAD_GREY * d / (variance.max(0.0).sqrt() + floor)
+            MIDDLE_GREY + SPREAD_GREY * (d - of.mean) / (of.variance.max(0.0).sqrt() + floor)
         } else {
             f32::NAN
         }
