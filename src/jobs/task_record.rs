@@ -63,6 +63,18 @@ impl TaskRecord {
     pub fn write(&self, folder: &Path, task: &Task) -> Result<(), WriteError> {
         text_file::write_json(&record_path(folder, task), self)
     }
+
+    /// Removes the record of a task, if it has one.
+    ///
+    /// # Errors
+    /// A file that cannot be removed.
+    pub fn remove(folder: &Path, task: &Task) -> Result<(), WriteError> {
+        let path = record_path(folder, task);
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(WriteError::new(&path, error)),
+            _ => Ok(()),
+        }
+    }
 }
 
 fn record_path(folder: &Path, task: &Task) -> PathBuf {

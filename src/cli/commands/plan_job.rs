@@ -2,7 +2,7 @@
 
 use crate::cli::output::{Failure, Terminal, duration_text};
 use crate::files::printed;
-use crate::jobs::{Division, JOB_FILE, Job, Network, PlanOptions, Step, plan};
+use crate::jobs::{Division, JOB_FILE, Job, Network, PlanOptions, SectionStep, plan};
 use crate::persist::atomic;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "network.toml lists the sections of a network:\n  \
     [[section]]\n  id = \"K12-K13\"            # names the folder of its results\n  \
     survey = \"2026/K12-K13\"   # folder of the survey, or its survey.toml\n\n\
+    With a `crs` and the places of manholes, `network-map --help`, the job has a map as well.\n\
     Options of a step are those of the section's survey.toml, as [options.stitch].\n\n\
     Example:\n  tunnelstitch plan-job network.toml --out job\n  tunnelstitch run-job job")]
 pub struct PlanJobArguments {
@@ -31,9 +32,9 @@ pub struct PlanJobArguments {
         long,
         value_enum,
         value_delimiter = ',',
-        default_values_t = [Step::Refine, Step::Stitch, Step::Report]
+        default_values_t = [SectionStep::Refine, SectionStep::Stitch, SectionStep::Report]
     )]
-    steps: Vec<Step>,
+    steps: Vec<SectionStep>,
     /// Processors of each task. The results do not depend on it.
     #[arg(
         long,
@@ -71,7 +72,8 @@ pub fn run(arguments: &PlanJobArguments, terminal: &Terminal) -> Result<(), Fail
             (shards, None) => Division::Shards(shards.unwrap_or(1) as usize),
         },
     };
-    if options.steps.contains(&Step::Report) && !options.steps.contains(&Step::Refine) {
+    if options.steps.contains(&SectionStep::Report) && !options.steps.contains(&SectionStep::Refine)
+    {
         return Err(Failure::usage(
             "--steps report needs refine, whose results it reports",
         ));

@@ -6,6 +6,7 @@ use crate::evaluate::converge::ConvergeError;
 use crate::frames::FrameError;
 use crate::inspect::InspectError;
 use crate::jobs::JobError;
+use crate::network_map::MapError;
 use crate::persist::atomic::WriteError;
 use crate::persist::checkpoint::CheckpointError;
 use crate::raster::RasterError;
@@ -130,6 +131,17 @@ impl From<JobError> for Failure {
                 code,
             },
             JobError::NotReady { .. } | JobError::Busy { .. } => Self::temporary(error.to_string()),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<MapError> for Failure {
+    fn from(error: MapError) -> Self {
+        match error {
+            MapError::Job(error) => error.into(),
+            MapError::Marks(error) => error.into(),
+            MapError::Database(_) => Self::bug(error.to_string()),
             _ => Self::input(error.to_string()),
         }
     }

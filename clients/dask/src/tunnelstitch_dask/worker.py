@@ -44,11 +44,19 @@ class Call:
     task: str
     limit_seconds: float
     """Time after which `run-task` itself is ended."""
+    runs_after_failures: bool
+    """True if the task runs when those before it have ended, whatever their ends."""
+
+    def may_run_after(self, outcome: Outcome) -> bool:
+        """True if a task before it has ended as it needs; a temporary failure is no end."""
+        if self.runs_after_failures:
+            return outcome.code not in (None, TEMPORARY)
+        return outcome.code == DONE
 
 
 def run_task(call: Call, *before: Outcome) -> Outcome:
-    """Runs a task if all tasks before it are done, and tells the client when it starts and ends."""
-    if any(outcome.code != DONE for outcome in before):
+    """Runs a task if those before it are done, and tells the client when it starts and ends."""
+    if not all(call.may_run_after(outcome) for outcome in before):
         return Outcome(call.task, None)
     worker = get_worker()
     event = {"task": call.task, "attempt": call.attempt, "worker": worker.address}
