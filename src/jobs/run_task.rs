@@ -4,8 +4,8 @@ use super::error::JobError;
 use super::job::{Job, Task, TriggerRule};
 use super::process::{Ending, run_process};
 use super::task_key::TaskKeys;
-use super::task_record::{TaskRecord, lock_path, log_path};
-use crate::files::{open_without_links, read_text};
+use super::task_record::{TaskRecord, error_of_log, lock_path, log_path};
+use crate::files::open_without_links;
 use crate::persist::atomic::{self, WriteError};
 use crate::persist::file_lock::FileLock;
 use std::fs::TryLockError;
@@ -19,8 +19,6 @@ pub const NOT_USABLE: u8 = 4;
 pub const TEMPORARY: u8 = 75;
 /// Exit code of a command that is interrupted.
 const INTERRUPTED: u8 = 130;
-/// Largest size of a log that is searched for the reason of a failure, bytes.
-const MAX_LOG_BYTES: u64 = 1 << 20;
 
 /// A task that is done.
 #[derive(Clone, Debug, PartialEq)]
@@ -175,14 +173,6 @@ fn run_command(
             ),
         )),
     }
-}
-
-/// The last error of a log; None if it has none.
-pub fn error_of_log(log: &Path) -> Option<String> {
-    let text = read_text(log, MAX_LOG_BYTES).unwrap_or_default();
-    let mut lines = text.lines().rev();
-    let error = lines.find_map(|line| line.strip_prefix("error: "));
-    error.map(str::to_owned)
 }
 
 fn likely_cause(signal: i32) -> &'static str {

@@ -2,8 +2,7 @@
 
 use super::error::JobError;
 use super::job::Task;
-use super::run_task::error_of_log;
-use super::task_record::{TaskRecord, log_path};
+use super::task_record::{TaskRecord, error_of_log, log_path};
 use std::path::{Path, PathBuf};
 
 /// The state of a task.

@@ -21,11 +21,11 @@ pub struct Accuracy {
     pub photometric: usize,
     /// 1-σ of the photometric frames against each other, median, pixels.
     pub registration_px: Option<f64>,
-    /// The same on the wall, millimetres, by the frames' own size of a pixel there.
+    /// That 1-σ on the wall, millimetres, by the size of a pixel of each frame there.
     pub registration_mm: Option<f64>,
     /// 1-σ of the photometric frames against the first, median, pixels.
     pub absolute_px: Option<f64>,
-    /// The same on the wall, millimetres.
+    /// That 1-σ on the wall, millimetres.
     pub absolute_mm: Option<f64>,
 }
 

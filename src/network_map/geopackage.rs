@@ -4,6 +4,7 @@
 
 use super::geometry::Geometry;
 use crate::jobs::Crs;
+use crs_definitions::Def;
 use rusqlite::types::Value;
 use rusqlite::{Connection, params};
 
@@ -12,46 +13,11 @@ const FILE_PRAGMAS: &str = "PRAGMA page_size = 4096;
     PRAGMA application_id = 0x47504B47;
     PRAGMA user_version = 10300;";
 
-/// Tables that every GeoPackage has (annex C), and the systems that they know (1.1.2.1.2).
-const TABLES: &str = r#"
-CREATE TABLE gpkg_spatial_ref_sys (
-  srs_name TEXT NOT NULL,
-  srs_id INTEGER PRIMARY KEY,
-  organization TEXT NOT NULL,
-  organization_coordsys_id INTEGER NOT NULL,
-  definition TEXT NOT NULL,
-  description TEXT
-);
-CREATE TABLE gpkg_contents (
-  table_name TEXT NOT NULL PRIMARY KEY,
-  data_type TEXT NOT NULL,
-  identifier TEXT UNIQUE,
-  description TEXT DEFAULT '',
-  last_change DATETIME NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ','now')),
-  min_x DOUBLE,
-  min_y DOUBLE,
-  max_x DOUBLE,
-  max_y DOUBLE,
-  srs_id INTEGER,
-  CONSTRAINT fk_gc_r_srs_id FOREIGN KEY (srs_id) REFERENCES gpkg_spatial_ref_sys(srs_id)
-);
-CREATE TABLE gpkg_geometry_columns (
-  table_name TEXT NOT NULL,
-  column_name TEXT NOT NULL,
-  geometry_type_name TEXT NOT NULL,
-  srs_id INTEGER NOT NULL,
-  z TINYINT NOT NULL,
-  m TINYINT NOT NULL,
-  CONSTRAINT pk_geom_cols PRIMARY KEY (table_name, column_name),
-  CONSTRAINT uk_gc_table_name UNIQUE (table_name),
-  CONSTRAINT fk_gc_tn FOREIGN KEY (table_name) REFERENCES gpkg_contents(table_name),
-  CONSTRAINT fk_gc_srs FOREIGN KEY (srs_id) REFERENCES gpkg_spatial_ref_sys (srs_id)
-);
-INSERT INTO gpkg_spatial_ref_sys VALUES
-  ('Undefined Cartesian', -1, 'NONE', -1, 'undefined', NULL),
-  ('Undefined geographic', 0, 'NONE', 0, 'undefined', NULL),
-  ('WGS 84', 4326, 'EPSG', 4326, 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,AUTHORITY["EPSG","7030"]],AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4326"]]', NULL);
-"#;
+/// Tables that every GeoPackage has.
+const TABLES: &str = include_str!("geopackage.sql");
+
+/// A system that every GeoPackage knows.
+const WGS_84: Def = crs_definitions::EPSG_4326;
 
 /// Time of the last change of every layer: equal content has equal bytes.
 const LAST_CHANGE: &str = "1970-01-01T00:00:00.000Z";
@@ -119,10 +85,15 @@ impl GeoPackage {
         database.execute_batch(FILE_PRAGMAS)?;
         let transaction = database.transaction()?;
         transaction.execute_batch(TABLES)?;
-        transaction.execute(
-            "INSERT INTO gpkg_spatial_ref_sys VALUES (?1, ?2, 'EPSG', ?2, ?3, NULL)",
-            params![self.crs.name(), self.crs.code(), self.crs.wkt()],
-        )?;
+        for (name, code, wkt) in [
+            ("WGS 84", WGS_84.code, WGS_84.wkt),
+            (self.crs.name(), self.crs.code(), self.crs.wkt()),
+        ] {
+            transaction.execute(
+                "INSERT INTO gpkg_spatial_ref_sys VALUES (?1, ?2, 'EPSG', ?2, ?3, NULL)",
+                params![name, code, wkt],
+            )?;
+        }
         for layer in &self.layers {
             layer.write(&transaction, i32::from(self.crs.code()))?;
         }

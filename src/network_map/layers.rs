@@ -281,7 +281,7 @@ fn link(path: Option<&Path>, base: &Path) -> Value {
 mod tests {
     use super::*;
 
-    /// What is not there yet is on the map all the same.
+    /// Nothing has been run, and the network is on the map all the same.
     #[test]
     fn sections_without_results_are_on_the_map_with_their_marks() {
         let dir = tempfile::tempdir().unwrap();

@@ -1,9 +1,9 @@
-//! How the work on a section ended.
+//! The state of a section: the ends of its tasks in one word.
 
 use crate::jobs::{Job, JobError, NOT_USABLE, Step, Task, TaskState};
 use std::path::{Path, PathBuf};
 
-/// How the work on a section ended, as the records of its job's tasks say.
+/// The state of a section, as the records of its tasks say.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SectionState {
     /// Its poses are refined, and may be used.
