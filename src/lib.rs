@@ -72,7 +72,7 @@
 //! | --- | --- |
 //! | `crates` | `geometry` < `core` < `photometry`, `super_resolve` < `refine`, `render`, `simulate` < `evaluate` < `src` |
 //! | `crates/geometry` | `files`, `numerics` < `recordings` < `camera` < `trajectory` < `surface` |
-//! | `crates/core` | `bitmap_text`, `colour_map`, `persist`, `points`, `progress` < `raster`, `frames` < `survey`, `test_wall` |
+//! | `crates/core` | `bitmap_text`, `colour_map`, `persist`, `points`, `progress` < `raster`, `frames`, `storage` < `survey`, `test_wall` |
 //! | `crates/refine` | `thresholds`, `options` < `parameters` < `linear` < `points` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `point_fit` < `comparison` < `tracking` < `validation` < `uncertainty` < `verdict` < `report` < `refined` < `stages` < `pipeline` < `deformation_bound`, `reading_search`, `shards` |
 //! | `crates/render` | `error` < `layout` < `warp` < `sampling` < `compositing` < `output` |
 //! | `src` | `check` < `report`, `inspect` < `jobs` < `network_map` < `cli` |
@@ -145,7 +145,7 @@ pub mod jobs;
 pub mod network_map;
 pub mod report;
 
-pub use tunnelstitch_core::{frames, persist, points, progress, raster, survey};
+pub use tunnelstitch_core::{frames, persist, points, progress, raster, storage, survey};
 pub use tunnelstitch_evaluate as evaluate;
 pub use tunnelstitch_geometry::{camera, files, surface, trajectory};
 pub use tunnelstitch_refine as refine;

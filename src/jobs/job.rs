@@ -232,6 +232,11 @@ impl Job {
 }
 
 impl Task {
+    /// True if it ends the refinement of its section: not for one shard of it.
+    pub fn ends_refinement(&self) -> bool {
+        self.step == Step::Refine && self.id == format!("{}.{}", self.section, self.step)
+    }
+
     fn validate(&self) -> Result<(), String> {
         let is_name = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
         let id = &self.id;

@@ -11,6 +11,7 @@
 //! | --- | --- |
 //! | sections, their surveys, and where they lie on the map | `network`: [`Network`] |
 //! | the graph and its file | [`Job`] |
+//! | its folder, on this machine or on storage | [`JobFolder`] |
 //! | its tasks, with needs and expectations | [`plan()`] |
 //! | hash by which a task is done or not | `task_key` |
 //! | record of a task that is done | [`TaskRecord`] |
@@ -21,6 +22,7 @@
 
 mod error;
 mod job;
+mod job_folder;
 mod network;
 mod plan;
 mod process;
@@ -34,6 +36,7 @@ mod text_file;
 
 pub use error::JobError;
 pub use job::{JOB_FILE, Job, Needs, SectionStep, Step, Task, TriggerRule};
+pub use job_folder::JobFolder;
 pub use network::{Crs, Manhole, Network, Section, SectionEnds, SectionLine};
 pub use plan::{Division, MAP_FILE, PlanOptions, plan};
 pub use process::end_processes;

@@ -8,6 +8,7 @@ use crate::files::printed;
 use crate::inspect::MARKS_GEOJSON;
 use crate::refine::{RefineOptions, ShardNumber};
 use crate::render::native_px_per_metre;
+use crate::storage::Mirror;
 use crate::survey::{Survey, toml_path};
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf, absolute};
@@ -107,6 +108,8 @@ fn map_task(network: &Network, folder: &Path, others: &[Task]) -> Result<Task, J
         }
         inputs.insert(from_folder(&survey, folder)?);
     }
+    let refined = others.iter().filter(|task| task.ends_refinement());
+    inputs.extend(refined.flat_map(|task| task.outputs.iter().cloned()));
     let network_file = file.to_string_lossy();
     let words = [
         "tunnelstitch",
@@ -334,7 +337,13 @@ fn inputs_of(survey: &Survey, folder: &Path) -> Result<Vec<PathBuf>, JobError> {
     for path in survey.own_files() {
         inputs.insert(from_folder(path, folder)?);
     }
+    let stored = survey.file.stored_frames()?;
+    inputs.extend(stored.iter().map(|url| PathBuf::from(url.to_string())));
+    let mirror = Mirror::of_user();
     for frame in survey.frames.iter() {
+        if mirror.has_path(&frame.path) && !stored.is_empty() {
+            continue;
+        }
         match frame.shared_file() {
             Some(file) => {
                 inputs.insert(from_folder(file, folder)?);

@@ -4,6 +4,7 @@ use super::error::JobError;
 use super::job::{Job, Task, TriggerRule};
 use super::task_state::TaskState;
 use crate::persist::provenance::{self, HashError};
+use crate::storage::{Mirror, StorageUrl};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tunnelstitch_core::PROGRAM;
@@ -33,7 +34,7 @@ impl<'j> TaskKeys<'j> {
     }
 
     /// The key of a task of the job: BLAKE3 of the program's version, the command, the names and
-    /// contents of its inputs, and the keys of the tasks that it comes after (or their ends, if it
+    /// contents (on storage: sizes and ETags) of its inputs, and the keys of the tasks that it comes after (or their ends, if it
     /// runs whatever these are), hexadecimal.
     ///
     /// # Errors
@@ -68,6 +69,12 @@ impl<'j> TaskKeys<'j> {
     fn input(&mut self, task: &Task, input: &'j Path) -> Result<blake3::Hash, JobError> {
         if let Some(hash) = self.inputs.get(input) {
             return Ok(*hash);
+        }
+        let stored = StorageUrl::of(input)
+            .and_then(|url| url.map(|url| Mirror::fingerprint(&url)).transpose());
+        if let Some(hash) = stored? {
+            self.inputs.insert(input, hash);
+            return Ok(hash);
         }
         let path = self.folder.join(input);
         if task.trigger_rule == TriggerRule::AllDone && !path.exists() {

@@ -5,7 +5,7 @@ use super::job::Task;
 use super::process::Usage;
 use super::text_file;
 use crate::files::read_text;
-use crate::persist::atomic::WriteError;
+use crate::persist::atomic::{self, WriteError};
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -71,15 +71,12 @@ impl TaskRecord {
     /// # Errors
     /// A file that cannot be removed.
     pub fn remove(folder: &Path, task: &Task) -> Result<(), WriteError> {
-        let path = record_path(folder, task);
-        match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(WriteError::new(&path, error)),
-            _ => Ok(()),
-        }
+        atomic::remove_file(&record_path(folder, task))
     }
 }
 
-fn record_path(folder: &Path, task: &Task) -> PathBuf {
+/// The record of a task.
+pub fn record_path(folder: &Path, task: &Task) -> PathBuf {
     folder.join(STATE_FOLDER).join(format!("{}.json", task.id))
 }
 

@@ -14,6 +14,7 @@ use crate::refine::{CovarianceError, ProblemError, ReadingSearchError, RefineErr
 use crate::render::RenderError;
 use crate::report::ReportError;
 use crate::simulate::SimulateError;
+use crate::storage::StorageError;
 use crate::surface::SurfaceError;
 use crate::survey::SurveyError;
 use crate::trajectory::PoseError;
@@ -126,6 +127,7 @@ impl From<JobError> for Failure {
                 }
             }
             JobError::Write(error) => error.into(),
+            JobError::Storage(error) => error.into(),
             JobError::Failed { code, .. } => Self {
                 message: error.to_string(),
                 code,
@@ -142,6 +144,24 @@ impl From<MapError> for Failure {
             MapError::Job(error) => error.into(),
             MapError::Marks(error) => error.into(),
             MapError::Database(_) => Self::bug(error.to_string()),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<StorageError> for Failure {
+    fn from(error: StorageError) -> Self {
+        match error.is_temporary() {
+            true => Self::temporary(error.to_string()),
+            false => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<SurveyError> for Failure {
+    fn from(error: SurveyError) -> Self {
+        match error {
+            SurveyError::Storage(error) => error.into(),
             _ => Self::input(error.to_string()),
         }
     }
@@ -247,7 +267,6 @@ bad_input!(
     FrameError,
     CovarianceError,
     SurfaceError,
-    SurveyError,
     PoseError
 );
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -23,6 +24,8 @@ from .outcome import DONE, INTERRUPTED, NOT_USABLE, TEMPORARY, Outcome
 
 # Exit code of the program for bad input.
 BAD_INPUT = 3
+# Start of an address on storage.
+STORAGE = re.compile(r"(s3|az|gs|file)://")
 # What is kept of a log and of messages, bytes.
 MAX_TAIL_BYTES = 4096
 
@@ -80,7 +83,8 @@ async def end_tasks(run: str) -> None:
 
 def _call(call: Call, worker: str, begin: float) -> Outcome:
     folder = Path(call.folder)
-    if not (folder / JOB_FILE).is_file():
+    # The program itself reads jobs on storage.
+    if not STORAGE.match(call.folder) and not (folder / JOB_FILE).is_file():
         message = (
             f"{worker} does not see {folder / JOB_FILE}; mount the storage there, or say where "
             "workers see it (--worker-path)"
