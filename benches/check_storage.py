@@ -36,8 +36,8 @@ from rasterio.windows import Window
 BUCKET, KEY_ID, SECRET = "tunnels", "AKIATESTTESTTESTTEST", "secret/Of0Nobody1Else2But3This4Test"
 # Share of requests that fail.
 FAILING = 0.1
-# Files with the time, the command line or the hash of paths of a run.
-OF_THE_RUN = {"run.toml", "refine.json", "report.json", "report.html"}
+# Files with times, the command line or absolute paths of a run.
+OF_THE_RUN = {"run.toml", "refine.json", "survey.toml", "report.json", "report.html"}
 
 
 class Proxy(BaseHTTPRequestHandler):
@@ -146,6 +146,11 @@ def main():
     errors += [f"frames on storage give another {name}" for name in wrong]
     print(f"frames on storage: {', '.join(same)} {'differ' if wrong else 'are those of files'}")
 
+    run("plan-job", survey, "--out", folder / "job", "--steps", "refine", "--quiet")
+    run("run-job", folder / "job", "--quiet")
+    if differing(folder / "job/survey/refined", folder / "refined-files"):
+        errors.append("a job with frames on storage has another result")
+
     # 2. A job on storage, of which two machines do a section each; the second draws the map.
     run("plan-job", local / "network.toml", "--out", local / "job", "--quiet")
     run("run-job", local / "job", "--quiet")
@@ -165,7 +170,10 @@ def main():
         errors += [f"{name}: {path} differs" for path in wrong]
     print(f"a job on storage: {len(tasks)} tasks on two machines, {Proxy.failed} of {Proxy.failed + Proxy.passed} requests failed")
 
-    # A frame that changes on the storage.
+    # Frames that change on the storage.
+    client.put_object(Bucket=BUCKET, Key="2026/K1/frames/000005.png", Body=(local / "K2/frames/000005.png").read_bytes())
+    if "would run" not in run("run-job", folder / "job", "--dry-run").stdout:
+        errors.append("a job does not see that a frame on storage has changed")
     frame = "2026/K2/frames/000003.png"
     client.put_object(Bucket=BUCKET, Key=frame, Body=b"no picture")
     failed = run("run-task", address, "K2.refine", machine="machine-1", check=False)

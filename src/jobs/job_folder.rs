@@ -62,8 +62,8 @@ impl JobFolder {
         self.put(Path::new(JOB_FILE))
     }
 
-    /// Fetches all that a task needs, and its own results: its inputs and those of all tasks that it
-    /// follows from, their records, and the outputs of those that it comes after.
+    /// Fetches all that a task needs, and its own results: its inputs and those of all tasks that
+    /// it follows from, their records, and the outputs of those that it comes after.
     ///
     /// # Errors
     /// Storage that refuses or fails; inputs that are not in the bucket of the job.

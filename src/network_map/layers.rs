@@ -131,7 +131,7 @@ struct SectionOnMap<'n> {
     accuracy: Option<Accuracy>,
     deformation: WorstDeformation,
     marks: Vec<Mark>,
-    /// Report, panorama, poses and tiles, if they are there.
+    /// Report, panorama, poses and tiles, if they are done.
     results: [Option<PathBuf>; 4],
 }
 
@@ -148,14 +148,14 @@ impl<'n> SectionOnMap<'n> {
         let deformation = refined.as_deref().map(WorstDeformation::read).transpose()?;
         let survey = toml_path(&section.survey);
         let marks = Marks::open(survey.parent().unwrap_or(Path::new("")))?;
+        // A task is done only with its outputs, which may be on another machine.
         let result = |step: Step, name: &str| {
             let output = folder.join(tasks.output(step, false)?);
             // Joined with nothing, a file would become a folder.
-            let path = match name {
+            Some(match name {
                 "" => output,
                 _ => output.join(name),
-            };
-            path.is_file().then_some(path)
+            })
         };
         Ok(Self {
             state: tasks.state(),

@@ -172,6 +172,36 @@ fn a_network_has_a_map_whatever_fails() {
     assert!(printed.contains("up to date"), "{printed}");
 }
 
+/// The program of the tests is built without storage.
+#[cfg(not(feature = "storage"))]
+#[test]
+fn storage_is_named_as_what_the_program_lacks() {
+    let dir = crate::support::first_frames(3);
+    edit(
+        &dir.path().join("survey.toml"),
+        "frames/*.jpg",
+        "s3://tunnels/2026/*.jpg",
+    );
+    let out = dir.path().join("out.tif");
+    for words in [
+        vec!["check", text(dir.path())],
+        vec!["stitch", text(dir.path()), "--out", text(&out)],
+        vec!["run-job", "s3://tunnels/job"],
+        vec!["run-task", "s3://tunnels/job", "K1.refine"],
+    ] {
+        let message = fail(&words, 3);
+        assert!(message.contains("s3://tunnels/"), "{message}");
+        assert!(message.contains("--features storage"), "{message}");
+    }
+    let mixed = fail(
+        &["plan-job", text(dir.path()), "--out", "s3://tunnels/job"],
+        2,
+    );
+    assert!(mixed.contains("both in one bucket"), "{mixed}");
+    let secret = fail(&["run-job", "s3://key:password@tunnels/job"], 3);
+    assert!(!secret.contains("password@"), "{secret}");
+}
+
 #[test]
 fn jobs_that_cannot_be_planned_or_read_are_refused() {
     let dir = tempfile::tempdir().unwrap();

@@ -94,8 +94,8 @@ impl FrameList {
     ///
     /// # Errors
     /// No pictures, video or recording, or more than one; a malformed pattern, no frames, frames on
-    /// storage that cannot be fetched, a video or recording that cannot be read, a malformed file of
-    /// times.
+    /// storage that cannot be fetched, a video or recording that cannot be read, a malformed file
+    /// of times.
     pub fn new(
         section: &FramesSection,
         toml_path: &Path,
