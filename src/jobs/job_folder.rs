@@ -62,8 +62,8 @@ impl JobFolder {
         self.put(Path::new(JOB_FILE))
     }
 
-    /// Fetches all that a task needs, and its own results: its inputs and those of all tasks that
-    /// it follows from, their records, and the outputs of those that it comes after.
+    /// Fetches all that a task needs, and its results if it is done: its inputs and those of all
+    /// tasks that it follows from, their records, and the outputs of those that it comes after.
     ///
     /// # Errors
     /// Storage that refuses or fails; inputs that are not in the bucket of the job.
@@ -71,8 +71,7 @@ impl JobFolder {
         if self.stored.is_none() {
             return Ok(());
         }
-        let mut needed: BTreeSet<PathBuf> = task.outputs.iter().cloned().collect();
-        needed.insert(record_path(Path::new(""), task));
+        let mut needed: BTreeSet<PathBuf> = BTreeSet::new();
         let places = job.places();
         let of_id = |id: &String| &job.tasks[places[id.as_str()]];
         let mut rest = vec![task];
@@ -93,11 +92,13 @@ impl JobFolder {
                 }
             }
         }
-        if task.trigger_rule == TriggerRule::AllSuccess {
-            let before = task.after.iter().map(of_id);
-            needed.extend(before.flat_map(|before| before.outputs.iter().cloned()));
-        }
-        needed.iter().try_for_each(|path| self.fetch(path))
+        needed.iter().try_for_each(|path| self.fetch(path))?;
+        let before = match task.trigger_rule {
+            TriggerRule::AllSuccess => task.after.as_slice(),
+            TriggerRule::AllDone => &[],
+        };
+        let mut read = before.iter().map(of_id).chain([task]);
+        read.try_for_each(|task| self.fetch_outputs(task))
     }
 
     /// Fetches all inputs, records and results of a job.
@@ -108,9 +109,21 @@ impl JobFolder {
         if self.stored.is_none() {
             return Ok(());
         }
-        self.fetch(Path::new(""))?;
         let inputs: BTreeSet<&PathBuf> = job.tasks.iter().flat_map(|task| &task.inputs).collect();
-        inputs.into_iter().try_for_each(|path| self.fetch(path))
+        inputs.into_iter().try_for_each(|path| self.fetch(path))?;
+        job.tasks.iter().try_for_each(|task| {
+            self.fetch(&record_path(Path::new(""), task))?;
+            self.fetch_outputs(task)
+        })
+    }
+
+    /// Fetches the outputs of a task that is done. Without a record, those of this machine are
+    /// where an attempt goes on that was interrupted.
+    fn fetch_outputs(&self, task: &Task) -> Result<(), JobError> {
+        if record_path(&self.path, task).is_file() {
+            task.outputs.iter().try_for_each(|path| self.fetch(path))?;
+        }
+        Ok(())
     }
 
     /// Puts the results of a task on the storage, its record last.

@@ -34,8 +34,8 @@ impl<'j> TaskKeys<'j> {
     }
 
     /// The key of a task of the job: BLAKE3 of the program's version, the command, the names and
-    /// contents (on storage: sizes and ETags) of its inputs, and the keys of the tasks that it comes
-    /// after (or their ends, if it runs whatever these are), hexadecimal.
+    /// contents (on storage: sizes and ETags) of its inputs, and the keys of the tasks that it
+    /// comes after (or their ends, if it runs whatever these are), hexadecimal.
     ///
     /// # Errors
     /// An input that cannot be read.
