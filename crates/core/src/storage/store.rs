@@ -184,7 +184,7 @@ impl Store {
     }
 
     fn fail(&self, key: &str, error: &object_store::Error) -> StorageError {
-        let (url, what) = (self.of(key), error.to_string().replace('\n', " "));
+        let (url, what) = (self.of(key), without_queries(&error.to_string()));
         match error {
             object_store::Error::PermissionDenied { .. }
             | object_store::Error::Unauthenticated { .. } => StorageError::Refused { url, what },
@@ -197,5 +197,28 @@ impl Store {
             url: self.of(key),
             what: error.to_string(),
         }
+    }
+}
+
+/// A text in one line, with addresses without their queries, which may have signatures.
+fn without_queries(text: &str) -> String {
+    let words = text
+        .split_whitespace()
+        .map(|word| match word.split_once('?') {
+            Some((address, _)) if address.contains("://") => address,
+            _ => word,
+        });
+    words.collect::<Vec<&str>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_have_no_signatures() {
+        let text = "Error performing\nGET https://a.net/c/k?sig=S%3D&se=1 in 3 ms: what? no";
+        let expected = "Error performing GET https://a.net/c/k in 3 ms: what? no";
+        assert_eq!(without_queries(text), expected);
     }
 }
