@@ -58,7 +58,7 @@
 //! [`super_resolve`] solves for the wall finer than any frame, for panoramas and poses alike;
 //! [`raster`] writes pictures larger than the memory; [`evaluate`] measures; [`report`] makes a
 //! page of it all; [`inspect`] puts the panorama on the wall in three dimensions; [`jobs`] does it
-//! for many surveys; [`cli`] prints.
+//! for many surveys, [`network_map`] shows them on a map; [`cli`] prints.
 //!
 //! # The order of the folders
 //!
@@ -72,10 +72,10 @@
 //! | --- | --- |
 //! | `crates` | `geometry` < `core` < `photometry`, `super_resolve` < `refine`, `render`, `simulate` < `evaluate` < `src` |
 //! | `crates/geometry` | `files`, `numerics` < `recordings` < `camera` < `trajectory` < `surface` |
-//! | `crates/core` | `bitmap_text`, `colour_map`, `persist`, `points`, `progress` < `raster`, `frames` < `survey`, `test_wall` |
+//! | `crates/core` | `bitmap_text`, `colour_map`, `persist`, `points`, `progress` < `raster`, `frames`, `storage` < `survey`, `test_wall` |
 //! | `crates/refine` | `thresholds`, `options` < `parameters` < `linear` < `points` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `point_fit` < `comparison` < `tracking` < `validation` < `uncertainty` < `verdict` < `report` < `refined` < `stages` < `pipeline` < `deformation_bound`, `reading_search`, `shards` |
 //! | `crates/render` | `error` < `layout` < `warp` < `sampling` < `compositing` < `output` |
-//! | `src` | `check` < `report`, `inspect`, `jobs` < `cli` |
+//! | `src` | `check` < `report`, `inspect` < `jobs` < `network_map` < `cli` |
 //!
 //! <!-- end of the order -->
 //!
@@ -142,9 +142,10 @@ pub mod check;
 pub mod cli;
 pub mod inspect;
 pub mod jobs;
+pub mod network_map;
 pub mod report;
 
-pub use tunnelstitch_core::{frames, persist, points, progress, raster, survey};
+pub use tunnelstitch_core::{frames, persist, points, progress, raster, storage, survey};
 pub use tunnelstitch_evaluate as evaluate;
 pub use tunnelstitch_geometry::{camera, files, surface, trajectory};
 pub use tunnelstitch_refine as refine;

@@ -11,7 +11,10 @@ const GROUPS: [(&str, &[&str]); 6] = [
         "Use the result",
         &["stitch", "locate", "view", "export", "convert"],
     ),
-    ("Many surveys", &["plan-job", "run-job", "run-task"]),
+    (
+        "Many surveys",
+        &["plan-job", "run-job", "run-task", "network-map"],
+    ),
     ("Try it", &["demo", "simulate", "converge", "project"]),
     ("The program", &["config", "completions", "man", "help"]),
 ];

@@ -1,8 +1,8 @@
 //! The command line as a whole: global flags, all commands, and the call of the chosen one.
 
 use super::commands::{
-    check, compare, config, converge, convert, demo, export, gyro, init, locate, plan, plan_job,
-    project, refine, report, run_job, run_task, shell, simulate, stitch, view,
+    check, compare, config, converge, convert, demo, export, gyro, init, locate, network_map, plan,
+    plan_job, project, refine, report, run_job, run_task, shell, simulate, stitch, view,
 };
 use super::configuration;
 use super::help::group_commands;
@@ -102,6 +102,7 @@ enum Command {
     PlanJob(plan_job::PlanJobArguments),
     RunJob(run_job::RunJobArguments),
     RunTask(run_task::RunTaskArguments),
+    NetworkMap(network_map::NetworkMapArguments),
     Project(project::ProjectArguments),
     Config(config::ConfigArguments),
     Completions(shell::CompletionsArguments),
@@ -184,6 +185,7 @@ impl Command {
             Self::PlanJob(arguments) => plan_job::run(arguments, terminal),
             Self::RunJob(arguments) => run_job::run(arguments, terminal),
             Self::RunTask(arguments) => run_task::run(arguments, terminal),
+            Self::NetworkMap(arguments) => network_map::run(arguments, terminal),
             Self::Project(arguments) => project::run(arguments, record, terminal),
             Self::Config(arguments) => config::run(arguments, definition, terminal),
             Self::Completions(arguments) => shell::print_completions(arguments, definition),

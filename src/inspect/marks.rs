@@ -78,6 +78,11 @@ impl Marks {
         })
     }
 
+    /// All marks, in the order of the file.
+    pub fn all(&self) -> &[Mark] {
+        &self.content.features
+    }
+
     /// Encodes the marks as GeoJSON.
     ///
     /// # Errors

@@ -3,6 +3,7 @@
 use crate::files::printed;
 use crate::persist::atomic::WriteError;
 use crate::persist::provenance::HashError;
+use crate::storage::StorageError;
 use crate::survey::SurveyError;
 use std::path::PathBuf;
 
@@ -56,6 +57,9 @@ pub enum JobError {
         /// The input and the error of the operating system.
         source: HashError,
     },
+    /// Storage cannot be used.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
     /// A result cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -48,8 +48,29 @@ pub struct Task {
     pub outputs: Vec<PathBuf>,
     /// Tasks whose outputs it reads.
     pub after: Vec<String>,
+    /// The ends of those tasks after which it runs.
+    #[serde(default, skip_serializing_if = "TriggerRule::is_default")]
+    pub trigger_rule: TriggerRule,
     /// Its needs and expectations.
     pub needs: Needs,
+}
+
+/// The ends of the tasks before a task after which it runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TriggerRule {
+    /// All of them are done, with results that may be used.
+    #[default]
+    AllSuccess,
+    /// All of them have ended: it reports on them, whether they are done, have failed or were
+    /// skipped, and what it reads may be missing.
+    AllDone,
+}
+
+impl TriggerRule {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// Needs and expectations of a task.
@@ -67,11 +88,8 @@ pub struct Needs {
 }
 
 /// A step of a section.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[serde(rename_all = "lowercase")]
-pub enum Step {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+pub enum SectionStep {
     /// Its poses are refined.
     Refine,
     /// Its wall is unrolled into a panorama.
@@ -82,6 +100,33 @@ pub enum Step {
     Export,
 }
 
+/// A step of a section, or of the whole network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Step {
+    /// [`SectionStep::Refine`].
+    Refine,
+    /// [`SectionStep::Stitch`].
+    Stitch,
+    /// [`SectionStep::Report`].
+    Report,
+    /// [`SectionStep::Export`].
+    Export,
+    /// The map of all sections is written.
+    Map,
+}
+
+impl From<SectionStep> for Step {
+    fn from(step: SectionStep) -> Self {
+        match step {
+            SectionStep::Refine => Self::Refine,
+            SectionStep::Stitch => Self::Stitch,
+            SectionStep::Report => Self::Report,
+            SectionStep::Export => Self::Export,
+        }
+    }
+}
+
 impl fmt::Display for Step {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
@@ -89,6 +134,7 @@ impl fmt::Display for Step {
             Self::Stitch => "stitch",
             Self::Report => "report",
             Self::Export => "export",
+            Self::Map => "map",
         })
     }
 }
@@ -186,6 +232,11 @@ impl Job {
 }
 
 impl Task {
+    /// True if it ends the refinement of its section: not for one shard of it.
+    pub fn ends_refinement(&self) -> bool {
+        self.step == Step::Refine && self.id == format!("{}.{}", self.section, self.step)
+    }
+
     fn validate(&self) -> Result<(), String> {
         let is_name = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
         let id = &self.id;
@@ -236,6 +287,7 @@ pub(super) mod tests {
             inputs: vec!["../in.txt".into()],
             outputs: vec![format!("a/{id}").into()],
             after: after.iter().map(|id| (*id).to_owned()).collect(),
+            trigger_rule: TriggerRule::AllSuccess,
             needs: Needs {
                 cores: 2,
                 memory_bytes: 1 << 30,

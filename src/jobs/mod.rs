@@ -9,17 +9,20 @@
 //!
 //! | subject | file |
 //! | --- | --- |
-//! | sections and their surveys | [`Network`] |
+//! | sections, their surveys, and where they lie on the map | `network`: [`Network`] |
 //! | the graph and its file | [`Job`] |
+//! | its folder, on this machine or on storage | [`JobFolder`] |
 //! | its tasks, with needs and expectations | [`plan()`] |
 //! | hash by which a task is done or not | `task_key` |
 //! | record of a task that is done | [`TaskRecord`] |
+//! | how the last attempt of a task ended | [`TaskState`] |
 //! | one task | [`run_task()`] |
 //! | a process with a limit of time | `process` |
 //! | all tasks on this machine | [`run_job()`] |
 
 mod error;
 mod job;
+mod job_folder;
 mod network;
 mod plan;
 mod process;
@@ -28,14 +31,17 @@ mod run_task;
 mod schedule;
 mod task_key;
 mod task_record;
+mod task_state;
 mod text_file;
 
 pub use error::JobError;
-pub use job::{JOB_FILE, Job, Needs, Step, Task};
-pub use network::{Network, Section};
-pub use plan::{Division, PlanOptions, plan};
+pub use job::{JOB_FILE, Job, Needs, SectionStep, Step, Task, TriggerRule};
+pub use job_folder::JobFolder;
+pub use network::{Crs, Manhole, Network, Section, SectionEnds, SectionLine};
+pub use plan::{Division, MAP_FILE, PlanOptions, plan};
 pub use process::end_processes;
 pub use run_job::{JobSummary, TaskEnd, TaskOutcome, run_job};
-pub use run_task::{DoneTask, read_records, run_task};
+pub use run_task::{DoneTask, NOT_USABLE, read_records, run_task};
 pub use schedule::Machine;
 pub use task_record::TaskRecord;
+pub use task_state::TaskState;

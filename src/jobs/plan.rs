@@ -1,13 +1,15 @@
 //! The tasks of a network: their commands, files, needs and expectations.
 
 use super::error::JobError;
-use super::job::{Job, Needs, Step, Task};
-use super::network::{Network, Section};
+use super::job::{Job, Needs, SectionStep, Step, Task, TriggerRule};
+use super::network::{Network, Section, SectionLine};
 use crate::check::{Effort, JOIN_SHARE, join_bytes, refine_processor_s, shard_bytes, shard_share};
 use crate::files::printed;
+use crate::inspect::MARKS_GEOJSON;
 use crate::refine::{RefineOptions, ShardNumber};
 use crate::render::native_px_per_metre;
-use crate::survey::Survey;
+use crate::storage::Mirror;
+use crate::survey::{Survey, toml_path};
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf, absolute};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -29,11 +31,18 @@ const LIMIT_FACTOR: f64 = 40.0;
 /// Least time before a task is ended, seconds.
 const MIN_LIMIT_S: f64 = 600.0;
 
+/// Time for the map of a network: a process and the figures of a section, seconds.
+const TIME_PER_SECTION_S: f64 = 0.1;
+/// Name of the map of a network in the folder of its job.
+pub const MAP_FILE: &str = "network.gpkg";
+/// Name in the place of a section for tasks of the whole network.
+const WHOLE_NETWORK: &str = "network";
+
 /// Choices of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlanOptions {
     /// The steps of every section.
-    pub steps: BTreeSet<Step>,
+    pub steps: BTreeSet<SectionStep>,
     /// Processors of a task.
     pub cores: u16,
     /// Shards in which each section is refined.
@@ -64,7 +73,8 @@ impl Division {
 /// Plans the tasks of a network for a job in `folder`.
 ///
 /// # Errors
-/// A survey that cannot be opened; a job in a folder whose files are inputs.
+/// A survey that cannot be opened; a section that has no place on the map; a job in a folder whose
+/// files are inputs.
 pub fn plan(network: &Network, folder: &Path, options: &PlanOptions) -> Result<Job, JobError> {
     let folder = normalised(folder)?;
     let tasks: Vec<Vec<Task>> = network
@@ -72,7 +82,55 @@ pub fn plan(network: &Network, folder: &Path, options: &PlanOptions) -> Result<J
         .par_map(|section| section_tasks(section, &folder, options))
         .into_iter()
         .collect::<Result<_, _>>()?;
-    Ok(Job::new(tasks.concat()))
+    let mut tasks = tasks.concat();
+    if network.crs.is_some() {
+        tasks.push(map_task(network, &folder, &tasks)?);
+    }
+    Ok(Job::new(tasks))
+}
+
+/// The task of the map, which comes after all `others`.
+fn map_task(network: &Network, folder: &Path, others: &[Task]) -> Result<Task, JobError> {
+    let file = from_folder(&network.path, folder)?;
+    let mut inputs = BTreeSet::from([file.clone()]);
+    for section in &network.sections {
+        SectionLine::of(network, section)?;
+        let survey = toml_path(&section.survey);
+        let tunnel = Survey::read_file(&survey).map(|file| file.tunnel);
+        let tunnel = tunnel.map_err(|source| JobError::Survey {
+            section: section.id.clone(),
+            source,
+        })?;
+        let of_survey = survey.parent().unwrap_or(Path::new(""));
+        let marks = Some(Path::new(MARKS_GEOJSON));
+        for name in [marks, tunnel.centreline.as_deref()].into_iter().flatten() {
+            inputs.insert(from_folder(&of_survey.join(name), folder)?);
+        }
+        inputs.insert(from_folder(&survey, folder)?);
+    }
+    let refined = others.iter().filter(|task| task.ends_refinement());
+    inputs.extend(refined.flat_map(|task| task.outputs.iter().cloned()));
+    let network_file = file.to_string_lossy();
+    let words = [
+        "tunnelstitch",
+        "network-map",
+        &network_file,
+        ".",
+        "--out",
+        MAP_FILE,
+    ];
+    let seconds = TIME_PER_SECTION_S * network.sections.len() as f64;
+    Ok(Task {
+        id: format!("{WHOLE_NETWORK}.{}", Step::Map),
+        section: WHOLE_NETWORK.to_owned(),
+        step: Step::Map,
+        command: words.map(str::to_owned).to_vec(),
+        inputs: inputs.into_iter().collect(),
+        outputs: vec![MAP_FILE.into()],
+        after: others.iter().map(|task| task.id.clone()).collect(),
+        trigger_rule: TriggerRule::AllDone,
+        needs: needs(seconds, 0, 1),
+    })
 }
 
 /// The tasks of a section.
@@ -87,21 +145,22 @@ fn section_tasks(
     })?;
     let inputs = inputs_of(&survey, folder)?;
     let work = Work::of(&survey, options.division.shards(&survey));
-    let is_refined = options.steps.contains(&Step::Refine);
+    let is_refined = options.steps.contains(&SectionStep::Refine);
     let call = Call {
         id: &section.id,
         survey: from_folder(&section.survey, folder)?,
         is_refined,
         shards: work.shards,
     };
-    let task = |id: String, step: Step, (command, output): (Vec<String>, String)| Task {
+    let task = |id: String, step: SectionStep, (command, output): (Vec<String>, String)| Task {
         id,
         section: section.id.clone(),
-        step,
+        step: step.into(),
         command,
         inputs: inputs.clone(),
         outputs: vec![output.into()],
         after: Vec::new(),
+        trigger_rule: TriggerRule::AllSuccess,
         needs: work.needs(step, options.cores),
     };
     let refine = format!("{}.{}", section.id, Step::Refine);
@@ -111,7 +170,7 @@ fn section_tasks(
             needs: work.needs_of_shard(options.cores),
             ..task(
                 format!("{refine}-{number}"),
-                Step::Refine,
+                SectionStep::Refine,
                 call.shard(number),
             )
         }));
@@ -119,12 +178,12 @@ fn section_tasks(
     let shards: Vec<String> = tasks.iter().map(|task| task.id.clone()).collect();
     tasks.extend(options.steps.iter().map(|step| Task {
         after: match step {
-            Step::Refine => shards.clone(),
+            SectionStep::Refine => shards.clone(),
             _ if is_refined => vec![refine.clone()],
             _ => Vec::new(),
         },
         ..task(
-            format!("{}.{step}", section.id),
+            format!("{}.{}", section.id, Step::from(*step)),
             *step,
             call.command_and_output(*step),
         )
@@ -146,7 +205,7 @@ struct Call<'s> {
 
 impl Call<'_> {
     /// The command of a step, and its output.
-    fn command_and_output(&self, step: Step) -> (Vec<String>, String) {
+    fn command_and_output(&self, step: SectionStep) -> (Vec<String>, String) {
         let Self { id, .. } = self;
         let survey = self.survey.to_string_lossy();
         let refined = format!("{id}/refined");
@@ -161,14 +220,14 @@ impl Call<'_> {
             _ => vec!["--join", shards.as_str()],
         };
         let (options, flag, output) = match step {
-            Step::Refine => (joined, "--out", refined.clone()),
-            Step::Stitch => (with_poses, "--out", format!("{id}/panorama.tif")),
-            Step::Report => (
+            SectionStep::Refine => (joined, "--out", refined.clone()),
+            SectionStep::Stitch => (with_poses, "--out", format!("{id}/panorama.tif")),
+            SectionStep::Report => (
                 vec!["--refined", refined.as_str()],
                 "--out",
                 format!("{id}/report"),
             ),
-            Step::Export => (with_poses, "--3dtiles", format!("{id}/tiles")),
+            SectionStep::Export => (with_poses, "--3dtiles", format!("{id}/tiles")),
         };
         let words = options.into_iter().chain([flag, output.as_str()]);
         (command(step, &survey, words), output)
@@ -186,7 +245,7 @@ impl Call<'_> {
         let words = ["--shard", shard.as_str(), "--out", folder.as_str()];
         let survey = self.survey.to_string_lossy();
         let output = output.to_string_lossy().into_owned();
-        (command(Step::Refine, &survey, words), output)
+        (command(SectionStep::Refine, &survey, words), output)
     }
 
     /// Folder of the shards, from that of the job.
@@ -197,11 +256,11 @@ impl Call<'_> {
 
 /// A command on a survey.
 fn command<'w>(
-    step: Step,
+    step: SectionStep,
     survey: &'w str,
     words: impl IntoIterator<Item = &'w str>,
 ) -> Vec<String> {
-    let name = step.to_string();
+    let name = Step::from(step).to_string();
     let first = ["tunnelstitch", name.as_str(), survey];
     let all = first.into_iter().map(str::to_owned);
     all.chain(words.into_iter().map(str::to_owned)).collect()
@@ -246,12 +305,12 @@ impl Work {
         }
     }
 
-    fn needs(&self, step: Step, cores: u16) -> Needs {
+    fn needs(&self, step: SectionStep, cores: u16) -> Needs {
         let panorama_s = TIME_PER_PANORAMA_PIXEL_S * self.panorama_px;
         let (processor_s, bytes) = match step {
-            Step::Refine => (self.shares[1] * self.refine_s, self.refine_bytes),
-            Step::Stitch | Step::Export => (panorama_s, PANORAMA_BYTES),
-            Step::Report => (PANORAMAS_OF_REPORT * panorama_s, PANORAMA_BYTES),
+            SectionStep::Refine => (self.shares[1] * self.refine_s, self.refine_bytes),
+            SectionStep::Stitch | SectionStep::Export => (panorama_s, PANORAMA_BYTES),
+            SectionStep::Report => (PANORAMAS_OF_REPORT * panorama_s, PANORAMA_BYTES),
         };
         needs(processor_s, bytes, cores)
     }
@@ -278,7 +337,13 @@ fn inputs_of(survey: &Survey, folder: &Path) -> Result<Vec<PathBuf>, JobError> {
     for path in survey.own_files() {
         inputs.insert(from_folder(path, folder)?);
     }
+    let stored = survey.file.stored_frames()?;
+    inputs.extend(stored.iter().map(|url| PathBuf::from(url.to_string())));
+    let mirror = Mirror::of_user();
     for frame in survey.frames.iter() {
+        if mirror.has_path(&frame.path) && !stored.is_empty() {
+            continue;
+        }
         match frame.shared_file() {
             Some(file) => {
                 inputs.insert(from_folder(file, folder)?);
@@ -333,9 +398,11 @@ fn normalised(path: &Path) -> Result<PathBuf, JobError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jobs::Crs;
     use crate::simulate::{SimulateOptions, write_survey};
 
-    fn survey(folder: &Path) -> Section {
+    /// A network of one small survey.
+    fn network(folder: &Path) -> Network {
         let options = SimulateOptions {
             frames: 2,
             supersample: 1,
@@ -343,13 +410,20 @@ mod tests {
             ..SimulateOptions::free()
         };
         write_survey(&options, folder, false, &crate::progress::Silent).unwrap();
-        Section {
-            id: "K1".to_owned(),
-            survey: folder.to_owned(),
+        Network {
+            path: folder.with_file_name("network.toml"),
+            crs: None,
+            manholes: Vec::new(),
+            sections: vec![Section {
+                id: "K1".to_owned(),
+                survey: folder.to_owned(),
+                ends: None,
+                place: [2, 6],
+            }],
         }
     }
 
-    fn options(steps: &[Step]) -> PlanOptions {
+    fn options(steps: &[SectionStep]) -> PlanOptions {
         PlanOptions {
             steps: steps.iter().copied().collect(),
             cores: 2,
@@ -361,11 +435,8 @@ mod tests {
     #[test]
     fn paths_are_relative_to_the_job() {
         let dir = tempfile::tempdir().unwrap();
-        let section = survey(&dir.path().join("s/../surveys/K1"));
-        let network = Network {
-            sections: vec![section],
-        };
-        let steps = [Step::Export, Step::Refine];
+        let network = network(&dir.path().join("s/../surveys/K1"));
+        let steps = [SectionStep::Export, SectionStep::Refine];
         let folder = dir.path().join("x/../jobs/./K");
         let job = plan(&network, &folder, &options(&steps)).unwrap();
         let [refine, export] = &job.tasks[..] else {
@@ -389,13 +460,11 @@ mod tests {
     #[test]
     fn shards_come_before_what_joins_them() {
         let dir = tempfile::tempdir().unwrap();
-        let network = Network {
-            sections: vec![survey(&dir.path().join("K1"))],
-        };
+        let network = network(&dir.path().join("K1"));
         let plan = |division: Division| {
             let options = PlanOptions {
                 division,
-                ..options(&[Step::Refine, Step::Stitch])
+                ..options(&[SectionStep::Refine, SectionStep::Stitch])
             };
             plan(&network, &dir.path().join("job"), &options).unwrap()
         };
@@ -420,18 +489,54 @@ mod tests {
     }
 
     #[test]
-    fn a_job_among_its_own_inputs_is_refused() {
+    fn the_map_comes_after_everything_if_the_network_has_a_place() {
         let dir = tempfile::tempdir().unwrap();
         let network = Network {
-            sections: vec![survey(dir.path())],
+            crs: Some(Crs::parse("EPSG:2056").unwrap()),
+            ..network(&dir.path().join("K1"))
         };
+        let folder = dir.path().join("job");
+        let plan = |network: &Network| plan(network, &folder, &options(&[SectionStep::Stitch]));
+        let message = plan(&network).unwrap_err().to_string();
+        let expected = "network.toml:2:6: section K1 has no place on the map";
+        assert!(message.contains(expected), "{message}");
+        let toml = dir.path().join("K1/survey.toml");
+        let text = std::fs::read_to_string(&toml).unwrap();
+        let bent = text.replacen("[tunnel]", "[tunnel]\ncentreline = \"line.txt\"", 1);
+        std::fs::write(&toml, bent).unwrap();
+        std::fs::write(dir.path().join("K1/line.txt"), "0 -9 0\n0 0 0\n0 9 0\n").unwrap();
+        let job = plan(&network).unwrap();
+        let [stitch, map] = &job.tasks[..] else {
+            panic!("{job:?}");
+        };
+        assert_eq!(map.after, [stitch.id.as_str()]);
+        assert_eq!(
+            map.command.join(" "),
+            "tunnelstitch network-map ../network.toml . --out network.gpkg"
+        );
+        // Marks count as soon as there are some.
+        let inputs = ["line.txt", "marks.geojson", "survey.toml"];
+        let inputs = inputs.map(|name| PathBuf::from(format!("../K1/{name}")));
+        assert_eq!(map.inputs[..3], inputs);
+        job.write(&folder).unwrap();
+        assert_eq!(Job::read(&folder).unwrap(), job);
+    }
+
+    #[test]
+    fn a_job_among_its_own_inputs_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let network = network(dir.path());
         let folder = dir.path().join("frames/job");
-        let error = plan(&network, &folder, &options(&[Step::Stitch])).unwrap_err();
+        let error = plan(&network, &folder, &options(&[SectionStep::Stitch])).unwrap_err();
         assert!(
             error.to_string().contains("choose another --out"),
             "{error}"
         );
-        let beside = plan(&network, &dir.path().join("job"), &options(&[Step::Stitch]));
+        let beside = plan(
+            &network,
+            &dir.path().join("job"),
+            &options(&[SectionStep::Stitch]),
+        );
         assert!(beside.unwrap().tasks[0].after.is_empty());
     }
 }

@@ -2,6 +2,7 @@
 
 use super::error::JobError;
 use super::job::Job;
+use super::job_folder::JobFolder;
 use super::process::output_of;
 use super::run_task::{NOT_USABLE, TEMPORARY, read_records};
 use super::schedule::{Machine, Schedule};
@@ -58,13 +59,13 @@ pub struct TaskEnd {
 /// # Errors
 /// An input or a record that cannot be read before the first task begins.
 pub fn run_job(
-    folder: &Path,
+    folder: &JobFolder,
     job: &Job,
     program: &Path,
     machine: Machine,
     progress: &dyn Progress,
 ) -> Result<JobSummary, JobError> {
-    let records = read_records(folder, job)?;
+    let records = read_records(folder.path(), job)?;
     let mut outcomes: Vec<Option<TaskOutcome>> = vec![None; job.tasks.len()];
     let is_done: Vec<bool> = records.iter().map(Option::is_some).collect();
     let mut schedule = Schedule::new(job, machine, &is_done);
@@ -91,7 +92,7 @@ pub fn run_job(
                 let sender = sender.clone();
                 running += 1;
                 // The receiver lives longer than all threads.
-                scope.spawn(move || sender.send((k, call(program, folder, id))));
+                scope.spawn(move || sender.send((k, call(program, folder.given(), id))));
             }
             if running == 0 {
                 break;

@@ -1,11 +1,11 @@
 //! One task: nothing to do, or its command and the record of it.
 
 use super::error::JobError;
-use super::job::{Job, Task};
+use super::job::{Job, Task, TriggerRule};
 use super::process::{Ending, run_process};
 use super::task_key::TaskKeys;
-use super::task_record::{TaskRecord, lock_path, log_path};
-use crate::files::{open_without_links, read_text};
+use super::task_record::{TaskRecord, error_of_log, lock_path, log_path};
+use crate::files::open_without_links;
 use crate::persist::atomic::{self, WriteError};
 use crate::persist::file_lock::FileLock;
 use std::fs::TryLockError;
@@ -19,8 +19,6 @@ pub const NOT_USABLE: u8 = 4;
 pub const TEMPORARY: u8 = 75;
 /// Exit code of a command that is interrupted.
 const INTERRUPTED: u8 = 130;
-/// Largest size of a log that is searched for the reason of a failure, bytes.
-const MAX_LOG_BYTES: u64 = 1 << 20;
 
 /// A task that is done.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,10 +36,19 @@ pub struct DoneTask {
 /// An input or a record that cannot be read.
 pub fn read_records(folder: &Path, job: &Job) -> Result<Vec<Option<TaskRecord>>, JobError> {
     let mut keys = TaskKeys::new(folder, job);
-    let records = job.tasks.iter();
-    records
-        .map(|task| done(folder, task, &keys.of(task)?))
-        .collect()
+    let mut records: Vec<Option<TaskRecord>> = Vec::new();
+    let places = job.places();
+    for task in &job.tasks {
+        let record = done(folder, task, &keys.of(task)?)?;
+        // What comes after the end of others is done again if one of them has yet to end.
+        let mut before = task.after.iter().map(|id| places[id.as_str()]);
+        let is_current = match task.trigger_rule {
+            TriggerRule::AllSuccess => true,
+            TriggerRule::AllDone => before.all(|k| records[k].is_some()),
+        };
+        records.push(record.filter(|_| is_current));
+    }
+    Ok(records)
 }
 
 /// Runs a task of the job in `folder` by `program`, unless it is done.
@@ -54,7 +61,11 @@ pub fn run_task(folder: &Path, job: &Job, id: &str, program: &Path) -> Result<Do
     // Before any input is read, which may take long.
     let _lock = lock(folder, task)?;
     let mut keys = TaskKeys::new(folder, job);
-    for after in &task.after {
+    let must_be_done = match task.trigger_rule {
+        TriggerRule::AllSuccess => task.after.as_slice(),
+        TriggerRule::AllDone => &[],
+    };
+    for after in must_be_done {
         let before = job.task(folder, after)?;
         let record = done(folder, before, &keys.of(before)?)?;
         if record.is_none_or(|record| record.exit_code != 0) {
@@ -71,6 +82,8 @@ pub fn run_task(folder: &Path, job: &Job, id: &str, program: &Path) -> Result<Do
             is_up_to_date: true,
         });
     }
+    // A record of other inputs is none of this attempt.
+    TaskRecord::remove(folder, task)?;
     let record = run_command(folder, task, key, program)?;
     record.write(folder, task)?;
     Ok(DoneTask {
@@ -144,7 +157,10 @@ fn run_command(
             }
         }
         Ending::Exit(INTERRUPTED) => Err(failed(TEMPORARY, "it was interrupted".to_owned())),
-        Ending::Exit(code) => Err(failed(code, reason(&log, code))),
+        Ending::Exit(code) => {
+            let reason = error_of_log(&log).unwrap_or_else(|| format!("exit code {code}"));
+            Err(failed(code, reason))
+        }
         Ending::Signal(signal) => Err(failed(
             TEMPORARY,
             format!("it was ended by signal {signal}{}", likely_cause(signal)),
@@ -157,16 +173,6 @@ fn run_command(
             ),
         )),
     }
-}
-
-/// The last error of a log, or the exit code.
-fn reason(log: &Path, code: u8) -> String {
-    let text = read_text(log, MAX_LOG_BYTES).unwrap_or_default();
-    let error = text
-        .lines()
-        .rev()
-        .find_map(|line| line.strip_prefix("error: "));
-    error.map_or_else(|| format!("exit code {code}"), str::to_owned)
 }
 
 fn likely_cause(signal: i32) -> &'static str {

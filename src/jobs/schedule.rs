@@ -1,6 +1,6 @@
 //! The order in which the tasks of a job run on one machine.
 
-use super::job::Job;
+use super::job::{Job, TriggerRule};
 
 /// Processors and memory of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,7 +81,9 @@ impl<'j> Schedule<'j> {
         let mut lost = Vec::new();
         for k in task + 1..self.states.len() {
             let is_lost = |earlier: &usize| self.states[*earlier] == State::Lost;
-            if self.states[k] == State::Waiting && self.before[k].iter().any(is_lost) {
+            let needs_success = self.job.tasks[k].trigger_rule == TriggerRule::AllSuccess;
+            let is_waiting = self.states[k] == State::Waiting;
+            if is_waiting && needs_success && self.before[k].iter().any(is_lost) {
                 self.states[k] = State::Lost;
                 lost.push(k);
             }
@@ -90,7 +92,12 @@ impl<'j> Schedule<'j> {
     }
 
     fn is_ready(&self, k: usize) -> bool {
-        let is_done = |earlier: &usize| self.states[*earlier] == State::Done;
+        let rule = self.job.tasks[k].trigger_rule;
+        let is_done = |earlier: &usize| match self.states[*earlier] {
+            State::Waiting | State::Running => false,
+            State::Done => true,
+            State::Lost => rule == TriggerRule::AllDone,
+        };
         self.states[k] == State::Waiting && self.before[k].iter().all(is_done)
     }
 
@@ -162,6 +169,25 @@ mod tests {
         assert_eq!(schedule.end(0, false), [1, 2]);
         assert_eq!(schedule.start_next(), Some(3));
         assert_eq!(schedule.start_next(), None);
+    }
+
+    #[test]
+    fn a_report_runs_after_all_others_whatever_their_ends() {
+        let mut job = job(&[
+            ("a", &[], 1.0),
+            ("b", &["a"], 1.0),
+            ("c", &[], 2.0),
+            ("map", &["a", "b", "c"], 9.0),
+        ]);
+        job.tasks[3].trigger_rule = TriggerRule::AllDone;
+        let mut schedule = Schedule::new(&job, TWO_CORES, &[false; 4]);
+        let mut started = [schedule.start_next(), schedule.start_next()];
+        started.sort();
+        assert_eq!(started, [Some(0), Some(2)]);
+        assert_eq!(schedule.end(0, false), [1]);
+        assert_eq!(schedule.start_next(), None);
+        assert!(schedule.end(2, true).is_empty());
+        assert_eq!(schedule.start_next(), Some(3));
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! The key of a task: a hash of everything that its outputs follow from.
 
 use super::error::JobError;
-use super::job::{Job, Task};
+use super::job::{Job, Task, TriggerRule};
+use super::task_state::TaskState;
 use crate::persist::provenance::{self, HashError};
+use crate::storage::{Mirror, StorageUrl};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tunnelstitch_core::PROGRAM;
@@ -32,7 +34,8 @@ impl<'j> TaskKeys<'j> {
     }
 
     /// The key of a task of the job: BLAKE3 of the program's version, the command, the names and
-    /// contents of its inputs, and the keys of the tasks that it comes after, hexadecimal.
+    /// contents (on storage: sizes and ETags) of its inputs, and the keys of the tasks that it
+    /// comes after (or their ends, if it runs whatever these are), hexadecimal.
     ///
     /// # Errors
     /// An input that cannot be read.
@@ -45,7 +48,10 @@ impl<'j> TaskKeys<'j> {
         for id in &task.after {
             // A job is read only if what a task comes after stands before it.
             let earlier = &self.job.tasks[self.places[id.as_str()]];
-            before.push(self.of(earlier)?);
+            before.push(match task.trigger_rule {
+                TriggerRule::AllSuccess => self.of(earlier)?,
+                TriggerRule::AllDone => end_of(&TaskState::read(self.folder, earlier)?),
+            });
         }
         let mut hasher = blake3::Hasher::new();
         add(&mut hasher, PROGRAM.as_bytes());
@@ -64,7 +70,17 @@ impl<'j> TaskKeys<'j> {
         if let Some(hash) = self.inputs.get(input) {
             return Ok(*hash);
         }
-        let files = files_of(&self.folder.join(input));
+        let stored = StorageUrl::of(input)
+            .and_then(|url| url.map(|url| Mirror::fingerprint(&url)).transpose());
+        if let Some(hash) = stored? {
+            self.inputs.insert(input, hash);
+            return Ok(hash);
+        }
+        let path = self.folder.join(input);
+        if task.trigger_rule == TriggerRule::AllDone && !path.exists() {
+            return Ok(blake3::hash(b""));
+        }
+        let files = files_of(&path);
         let hash = files.and_then(|files| hash_of(&files));
         let hash = hash.map_err(|source| JobError::Input {
             task: task.id.clone(),
@@ -72,6 +88,15 @@ impl<'j> TaskKeys<'j> {
         })?;
         self.inputs.insert(input, hash);
         Ok(hash)
+    }
+}
+
+/// The end of a task before one that reports on it, as far as its report depends on it.
+fn end_of(state: &TaskState) -> String {
+    match state {
+        TaskState::Done(record) => format!("{} {}", record.exit_code, record.key),
+        TaskState::Failed { reason } => format!("failed: {reason}"),
+        TaskState::NotRun => "not run".to_owned(),
     }
 }
 
@@ -127,6 +152,8 @@ fn hash_of(files: &[(PathBuf, PathBuf)]) -> Result<blake3::Hash, HashError> {
 #[cfg(test)]
 mod tests {
     use super::super::job::tests::task;
+    use super::super::process::Usage;
+    use super::super::task_record::TaskRecord;
     use super::*;
 
     #[test]
@@ -171,6 +198,47 @@ mod tests {
         seen.sort();
         seen.dedup();
         assert_eq!(seen.len(), 9);
+    }
+
+    #[test]
+    fn the_key_of_a_report_follows_the_ends_of_the_tasks_before() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut job = Job::new(vec![task("a.refine", &[]), task("n.map", &["a.refine"])]);
+        job.tasks[1].trigger_rule = TriggerRule::AllDone;
+        job.tasks[1].inputs = vec!["marks".into()];
+        let key = || TaskKeys::new(dir.path(), &job).of(&job.tasks[1]).unwrap();
+        // Neither the input of the first task nor that of the second is there.
+        let mut seen = vec![key()];
+        let log = dir.path().join("logs/a.refine.log");
+        std::fs::create_dir(dir.path().join("logs")).unwrap();
+        for text in ["error: no frames\n", "error: no camera\n"] {
+            std::fs::write(&log, text).unwrap();
+            seen.push(key());
+        }
+        let mut record = TaskRecord {
+            key: "k".to_owned(),
+            program: String::new(),
+            exit_code: 0,
+            usage: Usage {
+                seconds: 1.0,
+                processor_seconds: None,
+                peak_bytes: None,
+            },
+        };
+        record.write(dir.path(), &job.tasks[0]).unwrap();
+        seen.push(key());
+        // Its time is no part of what is reported.
+        record.usage.seconds = 2.0;
+        record.write(dir.path(), &job.tasks[0]).unwrap();
+        assert_eq!(seen.last(), Some(&key()));
+        record.exit_code = 4;
+        record.write(dir.path(), &job.tasks[0]).unwrap();
+        seen.push(key());
+        std::fs::write(dir.path().join("marks"), "one").unwrap();
+        seen.push(key());
+        seen.sort();
+        seen.dedup();
+        assert_eq!(seen.len(), 6);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::job::Task;
 use super::process::Usage;
 use super::text_file;
 use crate::files::read_text;
-use crate::persist::atomic::WriteError;
+use crate::persist::atomic::{self, WriteError};
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -16,6 +16,8 @@ const STATE_FOLDER: &str = "state";
 const LOG_FOLDER: &str = "logs";
 /// Largest size of a record, bytes.
 const MAX_BYTES: u64 = 1 << 16;
+/// Largest size of a log that is searched for the reason of a failure, bytes.
+const MAX_LOG_BYTES: u64 = 1 << 20;
 
 /// The record of a task that is done.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,9 +65,18 @@ impl TaskRecord {
     pub fn write(&self, folder: &Path, task: &Task) -> Result<(), WriteError> {
         text_file::write_json(&record_path(folder, task), self)
     }
+
+    /// Removes the record of a task, if it has one.
+    ///
+    /// # Errors
+    /// A file that cannot be removed.
+    pub fn remove(folder: &Path, task: &Task) -> Result<(), WriteError> {
+        atomic::remove_file(&record_path(folder, task))
+    }
 }
 
-fn record_path(folder: &Path, task: &Task) -> PathBuf {
+/// The record of a task.
+pub fn record_path(folder: &Path, task: &Task) -> PathBuf {
     folder.join(STATE_FOLDER).join(format!("{}.json", task.id))
 }
 
@@ -77,6 +88,14 @@ pub fn lock_path(folder: &Path, task: &Task) -> PathBuf {
 /// The log of a task.
 pub fn log_path(folder: &Path, task: &Task) -> PathBuf {
     folder.join(LOG_FOLDER).join(format!("{}.log", task.id))
+}
+
+/// The last error of a log; None if it has none.
+pub fn error_of_log(log: &Path) -> Option<String> {
+    let text = read_text(log, MAX_LOG_BYTES).unwrap_or_default();
+    let mut lines = text.lines().rev();
+    let error = lines.find_map(|line| line.strip_prefix("error: "));
+    error.map(str::to_owned)
 }
 
 #[cfg(test)]

@@ -8,10 +8,17 @@ use std::path::Path;
 use std::process::Command;
 
 /// Name with version, place if it is not the registry's, and licence of every package that the
-/// program, its build and its tests need on any system.
+/// program with all its features, its build and its tests need on any system.
 fn packages() -> BTreeSet<[String; 3]> {
     let tree = Command::new(env!("CARGO"))
-        .args(["tree", "--workspace", "--target", "all", "--locked"])
+        .args([
+            "tree",
+            "--workspace",
+            "--all-features",
+            "--target",
+            "all",
+            "--locked",
+        ])
         .args(["--prefix", "none", "--format", "{p}|{l}|"])
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()

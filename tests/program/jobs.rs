@@ -88,6 +88,120 @@ fn what_fails_is_named_and_the_rest_is_done() {
     assert!(log.contains("000003.png"), "{log}");
 }
 
+/// Rows of a query of a GeoPackage, of which every cell is a text.
+fn rows(map: &Path, query: &str) -> Vec<Vec<String>> {
+    let database = rusqlite::Connection::open(map).unwrap();
+    let mut query = database.prepare(query).unwrap();
+    let columns = query.column_count();
+    let cells = |row: &rusqlite::Row<'_>| (0..columns).map(|k| row.get(k)).collect();
+    query
+        .query_map([], cells)
+        .unwrap()
+        .map(Result::unwrap)
+        .collect()
+}
+
+/// The map has a section that failed, is the same from wherever it is drawn, and follows the marks.
+#[test]
+fn a_network_has_a_map_whatever_fails() {
+    let dir = tempfile::tempdir().unwrap();
+    plan(dir.path());
+    let [network, job] = ["network.toml", "job"].map(|name| dir.path().join(name));
+    edit(
+        &network,
+        "survey = \"s1\"",
+        "survey = \"s1\"\nfrom = \"M1\"\nto = \"M2\"",
+    );
+    edit(
+        &network,
+        "survey = \"s2\"",
+        "survey = \"s2\"\nfrom = \"M2\"\nto = \"M1\"",
+    );
+    let map_of = ["network-map", text(&network), text(&job), "--out"];
+    let by_hand = dir.path().join("map.gpkg");
+    let message = fail(&[&map_of[..], &[text(&by_hand)]].concat(), 3);
+    assert!(message.contains("network.toml:"), "{message}");
+    edit(
+        &network,
+        "[[section]]",
+        "crs = \"EPSG:2056\"\n[[manhole]]\nid = \"M1\"\nposition_m = [2600000, 1200000]\n\
+         [[manhole]]\nid = \"M2\"\nposition_m = [2600030, 1200040]\n[[section]]",
+    );
+    let steps = ["--steps", "refine"];
+    let out = ["--out", text(&job)];
+    succeed(&[&["plan-job", text(&network)], &out[..], &steps].concat());
+    std::fs::write(dir.path().join("s1/frames/000003.png"), "no picture").unwrap();
+    assert_eq!(
+        tunnelstitch(&["run-job", text(&job)]).status.code(),
+        Some(3)
+    );
+
+    let map = job.join("network.gpkg");
+    let sections = rows(
+        &map,
+        "SELECT id, state, coalesce(reason, ''), coalesce(poses, ''), \
+         coalesce(photometric_share, -1) || '' FROM sections",
+    );
+    assert_eq!(sections[0][..2], ["K1", "failed"]);
+    assert!(sections[0][2].starts_with("K1.refine: "), "{sections:?}");
+    assert!(sections[0][2].contains("000003.png"), "{sections:?}");
+    assert_eq!(
+        sections[1],
+        ["K2", "refined", "", "K2/refined/poses.tum", "1.0"]
+    );
+    let first = std::fs::read(&map).unwrap();
+    let beside = job.join("again.gpkg");
+    let printed = succeed(&[&map_of[..], &[text(&beside)]].concat());
+    assert!(printed.contains("1 failed, 1 refined"), "{printed}");
+    assert_eq!(std::fs::read(&beside).unwrap(), first);
+
+    let mark = r#"{"type": "FeatureCollection", "features": [{"type": "Feature", "id": "m1",
+        "geometry": {"type": "Point", "coordinates": [5.0, 1.5]},
+        "properties": {"class": "BAB", "severity": 3, "note": "wet", "chainage_m": 5.0,
+        "clock": "4:30", "theta_deg": 135.0, "x_m": 0.1, "y_m": 5.0, "z_m": -1.0,
+        "layer": "refined", "created": ""}}]}"#;
+    std::fs::write(dir.path().join("s2/marks.geojson"), mark).unwrap();
+    succeed(&["run-task", text(&job), "network.map"]);
+    let defects = rows(&map, "SELECT section, class, clock, hex(geom) FROM defects");
+    assert_eq!(defects[0][..3], ["K2", "BAB", "4:30"]);
+    // 5 m from the second manhole towards the first.
+    let place = [2_600_027.0, 1_200_036.0].map(f64::to_le_bytes).concat();
+    let place: String = place.iter().map(|byte| format!("{byte:02X}")).collect();
+    assert!(defects[0][3].ends_with(&place), "{defects:?}");
+    let printed = succeed(&["run-task", text(&job), "network.map"]);
+    assert!(printed.contains("up to date"), "{printed}");
+}
+
+/// The program of the tests is built without storage.
+#[cfg(not(feature = "storage"))]
+#[test]
+fn storage_is_named_as_what_the_program_lacks() {
+    let dir = crate::support::first_frames(3);
+    edit(
+        &dir.path().join("survey.toml"),
+        "frames/*.jpg",
+        "s3://tunnels/2026/*.jpg",
+    );
+    let out = dir.path().join("out.tif");
+    for words in [
+        vec!["check", text(dir.path())],
+        vec!["stitch", text(dir.path()), "--out", text(&out)],
+        vec!["run-job", "s3://tunnels/job"],
+        vec!["run-task", "s3://tunnels/job", "K1.refine"],
+    ] {
+        let message = fail(&words, 3);
+        assert!(message.contains("s3://tunnels/"), "{message}");
+        assert!(message.contains("--features storage"), "{message}");
+    }
+    let mixed = fail(
+        &["plan-job", text(dir.path()), "--out", "s3://tunnels/job"],
+        2,
+    );
+    assert!(mixed.contains("both in one bucket"), "{mixed}");
+    let secret = fail(&["run-job", "s3://key:password@tunnels/job"], 3);
+    assert!(!secret.contains("password@"), "{secret}");
+}
+
 #[test]
 fn jobs_that_cannot_be_planned_or_read_are_refused() {
     let dir = tempfile::tempdir().unwrap();

@@ -27,6 +27,15 @@ def test_a_job_is_read_from_its_folder_or_its_file(tmp_path: Path) -> None:
     assert job.tasks[0].needs.seconds == 2.0
 
 
+def test_what_runs_after_failures_is_not_lost_with_what_fails(tmp_path: Path) -> None:
+    report = task("n.map", ["a.refine", "a.stitch"]) | {"trigger_rule": "all_done"}
+    tasks = [task("a.refine"), task("a.stitch", ["a.refine"]), report, task("n.end", ["n.map"])]
+    graph = Graph(read_job(write(tmp_path, tree(tasks))))
+    names = [task.id for task in graph.lost_with("a.refine")]
+    assert names == ["a.stitch"]
+    assert len(graph.dependants("a.refine")) == 3
+
+
 def change_needs(name: str, value: object) -> Callable[[Any], None]:
     def change(job: Any) -> None:
         job["tasks"][0]["needs"][name] = value
@@ -54,6 +63,7 @@ def edit(index: int, **values: object) -> Callable[[Any], None]:
         (edit(0, id="../x"), "it names files"),
         (edit(0, command=[]), "has no command"),
         (edit(0, after="a"), "'after' is not a list of texts"),
+        (edit(0, trigger_rule="any"), "'trigger_rule' is not one of all_success, all_done"),
         (edit(1, id="a.refine"), "task 'a.refine' stands twice"),
         (edit(1, after=["b"]), "comes after 'b', which is not in the job"),
         (edit(0, after=["a.refine"]), "in a cycle: a.refine -> a.refine"),

@@ -76,6 +76,31 @@ def test_a_result_that_may_not_be_used_is_kept_and_nothing_comes_after_it(
     assert job.starts("K0.refine") == 1
 
 
+def with_report(tasks: list[Any]) -> list[Any]:
+    """Tasks, and one that runs when all of them have ended."""
+    report = task("network.map", [task["id"] for task in tasks])
+    return [*tasks, report | {"trigger_rule": "all_done"}]
+
+
+def test_a_report_on_all_tasks_runs_after_failures_and_again_after_a_change(
+    client: Client, make_job: MakeJob
+) -> None:
+    job = make_job(with_report(network(3, seconds=0.0)))
+    job.set_faults("K0.refine", "bad-input")
+    job.set_faults("K1.refine", "not-usable")
+    job.set_faults("K2.stitch", "full-disk", "full-disk")
+    summary, _ = run(job, client, retries=1)
+    assert {failure.task for failure in summary.failed} == {"K0.refine", "K2.stitch"}
+    assert "network.map" in summary.done
+    assert job.runs("network.map") == 1
+    partial = job.outputs()["network/map.txt"]
+    again, _ = run(job, client)
+    assert "network.map" in again.done
+    assert job.outputs()["network/map.txt"] != partial
+    last, _ = run(job, client)
+    assert "network.map" in last.up_to_date
+
+
 def test_temporary_failures_are_retried_as_often_as_allowed(
     client: Client, make_job: MakeJob
 ) -> None:

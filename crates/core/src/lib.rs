@@ -13,6 +13,7 @@ pub mod persist;
 pub mod points;
 pub mod progress;
 pub mod raster;
+pub mod storage;
 pub mod survey;
 #[doc(hidden)]
 pub mod test_wall;

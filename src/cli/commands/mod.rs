@@ -12,6 +12,7 @@ pub mod init;
 mod init_summary;
 pub mod locate;
 pub mod locate_points;
+pub mod network_map;
 pub mod overlay;
 pub mod plan;
 pub mod plan_job;

@@ -2,8 +2,9 @@
 
 use crate::cli::output::{Failure, Terminal, duration_text};
 use crate::files::printed;
-use crate::jobs::{Division, JOB_FILE, Job, Network, PlanOptions, Step, plan};
+use crate::jobs::{Division, JOB_FILE, Job, JobFolder, Network, PlanOptions, SectionStep, plan};
 use crate::persist::atomic;
+use crate::storage::{Mirror, StorageUrl};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -17,13 +18,15 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "network.toml lists the sections of a network:\n  \
     [[section]]\n  id = \"K12-K13\"            # names the folder of its results\n  \
     survey = \"2026/K12-K13\"   # folder of the survey, or its survey.toml\n\n\
+    With a `crs` and the places of manholes, `network-map --help`, the job has a map as well.\n\
     Options of a step are those of the section's survey.toml, as [options.stitch].\n\n\
     Example:\n  tunnelstitch plan-job network.toml --out job\n  tunnelstitch run-job job")]
 pub struct PlanJobArguments {
-    /// A network.toml, or a survey (its folder, or its survey.toml).
+    /// A network.toml, or a survey (its folder, or its survey.toml); with --out on storage, its
+    /// address in the same bucket.
     #[arg(value_name = "NETWORK|SURVEY")]
     network: PathBuf,
-    /// Folder of the job; created if missing.
+    /// Folder of the job, or its address on storage (s3://bucket/folder); created if missing.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     /// Steps of every section; a list. Without `refine`, the initial poses are used.
@@ -31,9 +34,9 @@ pub struct PlanJobArguments {
         long,
         value_enum,
         value_delimiter = ',',
-        default_values_t = [Step::Refine, Step::Stitch, Step::Report]
+        default_values_t = [SectionStep::Refine, SectionStep::Stitch, SectionStep::Report]
     )]
-    steps: Vec<Step>,
+    steps: Vec<SectionStep>,
     /// Processors of each task. The results do not depend on it.
     #[arg(
         long,
@@ -71,15 +74,17 @@ pub fn run(arguments: &PlanJobArguments, terminal: &Terminal) -> Result<(), Fail
             (shards, None) => Division::Shards(shards.unwrap_or(1) as usize),
         },
     };
-    if options.steps.contains(&Step::Report) && !options.steps.contains(&Step::Refine) {
+    if options.steps.contains(&SectionStep::Report) && !options.steps.contains(&SectionStep::Refine)
+    {
         return Err(Failure::usage(
             "--steps report needs refine, whose results it reports",
         ));
     }
-    let network = Network::read(&arguments.network)?;
-    atomic::check_folder(&arguments.out)?;
-    let job = plan(&network, &arguments.out, &options)?;
-    job.write(&arguments.out)?;
+    let folder = JobFolder::new(&arguments.out)?;
+    let network = read_network(&arguments.network, &folder)?;
+    atomic::check_folder(folder.path())?;
+    let job = plan(&network, folder.path(), &options)?;
+    folder.write_job(&job)?;
     let report = PlanReport::of(&job, network.sections.len(), &arguments.out);
     terminal.say(format!(
         "planned {} tasks of {} sections: about {} of processor time, at most {} MiB for a task",
@@ -94,6 +99,34 @@ pub fn run(arguments: &PlanJobArguments, terminal: &Terminal) -> Result<(), Fail
         printed(&arguments.out)
     ));
     terminal.result(&report)
+}
+
+/// Reads the network of a job; one on storage is fetched with its surveys.
+fn read_network(path: &Path, folder: &JobFolder) -> Result<Network, Failure> {
+    let [network_url, job_url] = [StorageUrl::of(path)?, StorageUrl::of(folder.given())?];
+    let bucket = |url: &Option<StorageUrl>| url.as_ref().map(StorageUrl::root);
+    if bucket(&network_url) != bucket(&job_url) {
+        return Err(Failure::usage(
+            "the network and --out must both be on this machine, or both in one bucket: a job \
+             names its surveys by relative paths",
+        ));
+    }
+    let Some(url) = network_url else {
+        return Ok(Network::read(path)?);
+    };
+    let mirror = Mirror::of_user();
+    let network = Network::read(&mirror.fetch(&url)?)?;
+    let folder = url.join(Path::new(".."))?;
+    for section in &network.sections {
+        let survey = section.survey.strip_prefix(mirror.path(&folder));
+        let survey = survey.unwrap_or(&section.survey);
+        let survey = match survey.extension().filter(|ending| *ending == "toml") {
+            Some(_) => survey.parent().unwrap_or(Path::new("")),
+            None => survey,
+        };
+        mirror.fetch(&folder.join(survey)?)?;
+    }
+    Ok(network)
 }
 
 /// The result, for `--json`.

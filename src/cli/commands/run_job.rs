@@ -2,7 +2,9 @@
 
 use crate::cli::output::{DryRunArguments, Failure, Terminal, own_program};
 use crate::files::printed;
-use crate::jobs::{Job, JobSummary, Machine, TaskEnd, TaskOutcome, read_records, run_job};
+use crate::jobs::{
+    Job, JobFolder, JobSummary, Machine, TaskEnd, TaskOutcome, read_records, run_job,
+};
 use crate::render::available_bytes;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -18,7 +20,7 @@ use std::path::PathBuf;
     tunnelstitch run-job job"
 )]
 pub struct RunJobArguments {
-    /// Folder that plan-job has written.
+    /// Folder that plan-job has written, or its address on storage (s3://bucket/folder).
     job: PathBuf,
     #[command(flatten)]
     dry_run: DryRunArguments,
@@ -29,16 +31,17 @@ pub struct RunJobArguments {
 /// # Errors
 /// [`Failure`] for everything wrong with the job; of the first task that failed, if there is one.
 pub fn run(arguments: &RunJobArguments, terminal: &Terminal) -> Result<(), Failure> {
-    let folder = &arguments.job;
-    let job = Job::read(folder)?;
+    let folder = JobFolder::new(&arguments.job)?;
+    let job = folder.read_job()?;
+    folder.fetch_all(&job)?;
     if arguments.dry_run.is_set() {
-        return print_states(arguments, &job, terminal);
+        return print_states(&folder, &job, terminal);
     }
     let machine = Machine {
         cores: rayon::current_num_threads(),
         memory_bytes: available_bytes(),
     };
-    let summary = run_job(folder, &job, &own_program()?, machine, terminal)?;
+    let summary = run_job(&folder, &job, &own_program()?, machine, terminal)?;
     let failures = print_ends(&summary, terminal);
     terminal.result(&summary)?;
     match failures {
@@ -46,7 +49,7 @@ pub fn run(arguments: &RunJobArguments, terminal: &Terminal) -> Result<(), Failu
         Some(code) => Err(Failure {
             message: format!(
                 "not all tasks of {} are done; the same command runs just what is missing",
-                printed(folder)
+                printed(folder.given())
             ),
             code,
         }),
@@ -97,12 +100,8 @@ struct PlannedTask<'a> {
 }
 
 /// Prints which tasks are done and which are not.
-fn print_states(
-    arguments: &RunJobArguments,
-    job: &Job,
-    terminal: &Terminal,
-) -> Result<(), Failure> {
-    let records = read_records(&arguments.job, job)?;
+fn print_states(folder: &JobFolder, job: &Job, terminal: &Terminal) -> Result<(), Failure> {
+    let records = read_records(folder.path(), job)?;
     let tasks = job.tasks.iter().zip(&records);
     let states: Vec<PlannedTask> = tasks
         .map(|(task, record)| PlannedTask {

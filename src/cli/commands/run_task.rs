@@ -1,7 +1,7 @@
 //! `tunnelstitch run-task`: runs one task of a job.
 
 use crate::cli::output::{Failure, Terminal, duration_text, own_program};
-use crate::jobs::{DoneTask, Job, TaskRecord, run_task};
+use crate::jobs::{DoneTask, Job, JobError, JobFolder, TaskRecord, run_task};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use std::path::PathBuf;
     75  failed, but may succeed later or elsewhere\n\n\
     Example:\n  tunnelstitch run-task job K12-K13.refine")]
 pub struct RunTaskArguments {
-    /// Folder that plan-job has written.
+    /// Folder that plan-job has written, or its address on storage (s3://bucket/folder).
     job: PathBuf,
     /// Identifier of the task in job.json.
     task: String,
@@ -29,13 +29,14 @@ pub struct RunTaskArguments {
 /// # Errors
 /// [`Failure`] for everything wrong with the job, its inputs, or the command of the task.
 pub fn run(arguments: &RunTaskArguments, terminal: &Terminal) -> Result<(), Failure> {
-    let job = Job::read(&arguments.job)?;
-    let done = run_task(&arguments.job, &job, &arguments.task, &own_program()?)?;
+    let folder = JobFolder::new(&arguments.job)?;
+    let job = folder.read_job()?;
+    let task = &arguments.task;
+    let done = run_in(&folder, &job, task)?;
     let DoneTask {
         record,
         is_up_to_date,
     } = &done;
-    let task = &arguments.task;
     terminal.say(match is_up_to_date {
         true => format!("{task}: up to date"),
         false => format!("{task}: done in {}", duration_text(record.usage.seconds)),
@@ -51,6 +52,20 @@ pub fn run(arguments: &RunTaskArguments, terminal: &Terminal) -> Result<(), Fail
             "task {task}: its result may not be used; logs/{task}.log says why"
         ))),
     }
+}
+
+/// Runs the task with what the storage has, if the job is there; its results go there.
+fn run_in(folder: &JobFolder, job: &Job, id: &str) -> Result<DoneTask, Failure> {
+    let task = job.task(folder.path(), id)?;
+    folder.fetch_for(job, task)?;
+    let run = run_task(folder.path(), job, id, &own_program()?);
+    match &run {
+        Ok(done) if done.is_up_to_date => {}
+        Ok(_) => folder.put_results(task)?,
+        Err(JobError::Failed { .. }) => folder.put_failure(task)?,
+        Err(_) => {}
+    }
+    Ok(run?)
 }
 
 /// The result, for `--json`.

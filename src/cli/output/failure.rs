@@ -6,6 +6,7 @@ use crate::evaluate::converge::ConvergeError;
 use crate::frames::FrameError;
 use crate::inspect::InspectError;
 use crate::jobs::JobError;
+use crate::network_map::MapError;
 use crate::persist::atomic::WriteError;
 use crate::persist::checkpoint::CheckpointError;
 use crate::raster::RasterError;
@@ -13,6 +14,7 @@ use crate::refine::{CovarianceError, ProblemError, ReadingSearchError, RefineErr
 use crate::render::RenderError;
 use crate::report::ReportError;
 use crate::simulate::SimulateError;
+use crate::storage::StorageError;
 use crate::surface::SurfaceError;
 use crate::survey::SurveyError;
 use crate::trajectory::PoseError;
@@ -125,11 +127,41 @@ impl From<JobError> for Failure {
                 }
             }
             JobError::Write(error) => error.into(),
+            JobError::Storage(error) => error.into(),
             JobError::Failed { code, .. } => Self {
                 message: error.to_string(),
                 code,
             },
             JobError::NotReady { .. } | JobError::Busy { .. } => Self::temporary(error.to_string()),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<MapError> for Failure {
+    fn from(error: MapError) -> Self {
+        match error {
+            MapError::Job(error) => error.into(),
+            MapError::Marks(error) => error.into(),
+            MapError::Database(_) => Self::bug(error.to_string()),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<StorageError> for Failure {
+    fn from(error: StorageError) -> Self {
+        match error.is_temporary() {
+            true => Self::temporary(error.to_string()),
+            false => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<SurveyError> for Failure {
+    fn from(error: SurveyError) -> Self {
+        match error {
+            SurveyError::Storage(error) => error.into(),
             _ => Self::input(error.to_string()),
         }
     }
@@ -235,7 +267,6 @@ bad_input!(
     FrameError,
     CovarianceError,
     SurfaceError,
-    SurveyError,
     PoseError
 );
 

@@ -19,10 +19,18 @@ class Graph:
 
     def dependants(self, task_id: str) -> list[Task]:
         """All tasks that come after a task, directly or not, in the order of the job."""
+        return self._later(task_id, lambda _: True)
+
+    def lost_with(self, task_id: str) -> list[Task]:
+        """The tasks that cannot run if a task fails, in the order of the job."""
+        return self._later(task_id, lambda task: not task.runs_after_failures)
+
+    def _later(self, task_id: str, follows: Callable[[Task], bool]) -> list[Task]:
         found: set[str] = set()
         rest = [task_id]
         while rest:
-            fresh = [later for later in self._next[rest.pop()] if later not in found]
+            later = (name for name in self._next[rest.pop()] if follows(self.tasks[name]))
+            fresh = [name for name in later if name not in found]
             found.update(fresh)
             rest.extend(fresh)
         return [task for task in self.tasks.values() if task.id in found] if found else []

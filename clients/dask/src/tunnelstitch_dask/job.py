@@ -12,6 +12,8 @@ from typing import Any, NoReturn
 JOB_FILE = "job.json"
 FORMAT = "tunnelstitch job"
 VERSION = 1
+# Values of `trigger_rule`, the first unless given: True if a task runs after failures, too.
+TRIGGER_RULES = {"all_success": False, "all_done": True}
 # Identifiers name files.
 TASK_ID = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]*")
 
@@ -45,6 +47,9 @@ class Task:
     after: tuple[str, ...]
     """Tasks whose outputs it reads."""
     needs: Needs
+    runs_after_failures: bool = False
+    """True if it runs when the tasks before it have ended, whatever their ends: it reports on
+    them."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +115,13 @@ class _Reader:
     def refuse(self, key: str, expected: str) -> NoReturn:
         raise JobError(f"{self._where}: {key!r} is not {expected}")
 
+    def choice(self, key: str, choices: dict[str, bool]) -> bool:
+        """What the choice of an optional key stands for; without it, the first choice."""
+        value = self._values.pop(key, next(iter(choices)))
+        if not isinstance(value, str) or value not in choices:
+            self.refuse(key, f"one of {', '.join(choices)}")
+        return choices[value]
+
     def text(self, key: str) -> str:
         value = self.take(key)
         if not isinstance(value, str) or not value:
@@ -172,6 +184,7 @@ def _parse_task(tree: object, index: int) -> Task:
         outputs=reader.texts("outputs"),
         after=reader.texts("after"),
         needs=_parse_needs(reader.take("needs"), where),
+        runs_after_failures=reader.choice("trigger_rule", TRIGGER_RULES),
     )
     reader.end()
     if not TASK_ID.fullmatch(task.id):

@@ -182,6 +182,7 @@ class JobRun:
                 folder=self._folder,
                 task=task.id,
                 limit_seconds=task.needs.limit_seconds + self._options.grace_seconds,
+                runs_after_failures=task.runs_after_failures,
             )
             future = self._client.submit(
                 run_task,
@@ -377,7 +378,7 @@ class JobRun:
         self._skip_dependants(state.task)
 
     def _skip_dependants(self, task: Task) -> None:
-        for later in self._graph.dependants(task.id):
+        for later in self._graph.lost_with(task.id):
             state = self._states[later.id]
             if state.phase.is_open:
                 self._end(state, Phase.SKIPPED)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -23,6 +24,8 @@ from .outcome import DONE, INTERRUPTED, NOT_USABLE, TEMPORARY, Outcome
 
 # Exit code of the program for bad input.
 BAD_INPUT = 3
+# Start of an address on storage.
+STORAGE = re.compile(r"(s3|az|gs|file)://")
 # What is kept of a log and of messages, bytes.
 MAX_TAIL_BYTES = 4096
 
@@ -44,11 +47,19 @@ class Call:
     task: str
     limit_seconds: float
     """Time after which `run-task` itself is ended."""
+    runs_after_failures: bool
+    """True if the task runs when those before it have ended, whatever their ends."""
+
+    def may_run_after(self, outcome: Outcome) -> bool:
+        """True if a task before it has ended as it needs; a temporary failure is no end."""
+        if self.runs_after_failures:
+            return outcome.code not in (None, TEMPORARY)
+        return outcome.code == DONE
 
 
 def run_task(call: Call, *before: Outcome) -> Outcome:
-    """Runs a task if all tasks before it are done, and tells the client when it starts and ends."""
-    if any(outcome.code != DONE for outcome in before):
+    """Runs a task if those before it are done, and tells the client when it starts and ends."""
+    if not all(call.may_run_after(outcome) for outcome in before):
         return Outcome(call.task, None)
     worker = get_worker()
     event = {"task": call.task, "attempt": call.attempt, "worker": worker.address}
@@ -72,7 +83,8 @@ async def end_tasks(run: str) -> None:
 
 def _call(call: Call, worker: str, begin: float) -> Outcome:
     folder = Path(call.folder)
-    if not (folder / JOB_FILE).is_file():
+    # The program itself reads jobs on storage.
+    if not STORAGE.match(call.folder) and not (folder / JOB_FILE).is_file():
         message = (
             f"{worker} does not see {folder / JOB_FILE}; mount the storage there, or say where "
             "workers see it (--worker-path)"

@@ -2,6 +2,7 @@
 
 use super::file::SurveyFile;
 use super::open::Survey;
+use crate::storage::StorageUrl;
 use std::path::Path;
 
 /// Files that refine has written beside a survey.
@@ -18,8 +19,9 @@ pub struct FoundFiles<'f> {
 impl Survey {
     /// `survey.toml` for another folder, with what refine has found: radius, calibration and shape.
     ///
-    /// Frames and poses are those of this survey, their paths absolute. The radius replaces only
-    /// that of a straight round tunnel. The tables `[calibrate]` and `[options]` are left out.
+    /// Frames and poses are those of this survey, their paths absolute (or addresses). The
+    /// radius replaces only that of a straight round tunnel. The tables `[calibrate]` and
+    /// `[options]` are left out.
     pub fn as_found(&self, found: &FoundFiles) -> SurveyFile {
         let folder = std::path::absolute(&self.folder).unwrap_or_else(|_| self.folder.clone());
         let mut file = self.file.clone();
@@ -40,7 +42,8 @@ impl Survey {
         file.tunnel.shape_file = found.shape_file.map(Into::into);
         let of_rig = file.camera.all_mut().iter_mut();
         let of_rig = of_rig.filter_map(|camera| camera.frames.as_mut());
-        for images in of_rig.chain(file.frames.images.as_mut()) {
+        let is_here = |images: &&mut String| matches!(StorageUrl::parse(images), Ok(None));
+        for images in of_rig.chain(file.frames.images.as_mut()).filter(is_here) {
             let escaped = glob::Pattern::escape(&folder.to_string_lossy());
             let pattern = Path::new(&escaped).join(&*images);
             *images = pattern.to_string_lossy().into_owned();

@@ -2,6 +2,7 @@
 
 use crate::frames::FrameError;
 use crate::points::PointsError;
+use crate::storage::StorageError;
 use std::path::PathBuf;
 use tunnelstitch_geometry::camera::CalibrationError;
 use tunnelstitch_geometry::files::printed;
@@ -43,6 +44,9 @@ pub enum SurveyError {
         /// The value and its valid range.
         what: String,
     },
+    /// Frames on storage cannot be fetched.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
     /// Measured points cannot be read.
     #[error(transparent)]
     Points(#[from] PointsError),

@@ -7,6 +7,7 @@ use super::poses_section::PosesSection;
 use super::rig_section::RigSection;
 use super::tunnel::TunnelSection;
 use crate::frames::PictureOrientation;
+use crate::storage::{StorageError, StorageUrl};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -70,6 +71,17 @@ impl SurveyFile {
         .into_iter()
         .chain(of_cameras)
         .flatten()
+    }
+
+    /// Patterns of frames on storage.
+    ///
+    /// # Errors
+    /// A malformed address.
+    pub fn stored_frames(&self) -> Result<Vec<StorageUrl>, StorageError> {
+        let cameras = 0..self.camera.all().len();
+        let patterns = cameras.filter_map(|camera| self.frames_of(camera).images);
+        let urls: Result<Vec<_>, _> = patterns.map(|text| StorageUrl::parse(&text)).collect();
+        Ok(urls?.into_iter().flatten().collect())
     }
 
     /// The section of the frames that camera `camera` took.

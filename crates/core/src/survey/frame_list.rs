@@ -4,6 +4,7 @@ use super::error::SurveyError;
 use super::file::FramesSection;
 use super::frame_times;
 use crate::frames::{self, FrameFile, PictureOrientation, PictureReading, RecordedImages, Video};
+use crate::storage::{Mirror, StorageUrl};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -92,8 +93,9 @@ impl FrameList {
     /// folder is not a frame.
     ///
     /// # Errors
-    /// No pictures, video or recording, or more than one; a malformed pattern, no frames, a video
-    /// or recording that cannot be read, a malformed file of times.
+    /// No pictures, video or recording, or more than one; a malformed pattern, no frames, frames on
+    /// storage that cannot be fetched, a video or recording that cannot be read, a malformed file
+    /// of times.
     pub fn new(
         section: &FramesSection,
         toml_path: &Path,
@@ -112,7 +114,10 @@ impl FrameList {
             (Some(pattern), None, None) => {
                 let reading = check_images(section).map_err(value)?;
                 let mask = section.mask.as_ref().map(|mask| folder.join(mask));
-                let listed = frames::list_frames(folder, pattern, mask.as_deref())?;
+                let stored = StorageUrl::parse(pattern)?;
+                let fetched = stored.map(|url| Mirror::of_user().fetch_pattern(&url));
+                let pattern = fetched.unwrap_or_else(|| Ok(pattern.clone()))?;
+                let listed = frames::list_frames(folder, &pattern, mask.as_deref())?;
                 Self::of_images(listed, reading)
             }
             (None, Some(video), None) => {

@@ -184,7 +184,7 @@ impl TunnelSection {
             what: format!("tunnel: {what}"),
         };
         let section = self.section().map_err(value)?;
-        let Some(centreline) = &self.centreline else {
+        let Some(line) = self.centreline(folder, section.as_ref())? else {
             return Ok(match (self.shape, self.radius_m) {
                 // The fastest shape.
                 (Shape::Circle, Some(radius_m)) => {
@@ -193,11 +193,27 @@ impl TunnelSection {
                 _ => Arc::new(Prism::new(section)),
             });
         };
+        Ok(Arc::new(Swept::new(section, line)))
+    }
+
+    /// The centreline of the given section, None if it is the world's y axis; its path is relative
+    /// to `folder`.
+    ///
+    /// # Errors
+    /// A centreline that cannot be read or that no tunnel can follow.
+    pub fn centreline(
+        &self,
+        folder: &Path,
+        section: &dyn Section,
+    ) -> Result<Option<Centreline>, SurveyError> {
+        let Some(centreline) = &self.centreline else {
+            return Ok(None);
+        };
         let path = folder.join(centreline);
         let points = read_centreline(&path)?;
         let line = Centreline::through(&points, self.nominal_m(), section.farthest_m());
         let line = line.map_err(|error| PoseError::file(&path, error.to_string()))?;
-        Ok(Arc::new(Swept::new(section, line)))
+        Ok(Some(line))
     }
 
     /// Creates the section, or returns the problem of its sizes.
