@@ -5,13 +5,14 @@
 //! its sheen, mains flicker from row to row, an unknown tone curve, the fall of light along the
 //! tunnel), detail finer than it is still the wall's. With local means taken over a window,
 //!
-//! `N = 128 + 40 (I − Ī)/(√(mean (I − Ī)²) + κ σ)`,
+//! `N = 128 + 40 (D − D̄)/(√(mean (D − D̄)²) + κ σ)`,   `D = I − Ī`,
 //!
 //! σ the noise of the frame: contrast relative to that of its surroundings, which the light has
 //! scaled alike, or to the noise where there is no more than that.
 //!
-//! The window of the mean is nine times as wide as high: rows are read one after another, and
-//! flicker varies with the row only.
+//! The window of `Ī` is nine times as wide as high: rows are read one after another, and flicker
+//! varies with the row only. What it leaves of a light that varies along the rows, a sheen of its
+//! width, `D̄` takes off, the mean over the square window of the spread.
 
 use super::grey::GreyImage;
 use super::noise::noise_sigma;
@@ -116,6 +117,23 @@ mod tests {
         let flickering = normalise_locally(&picture(flicker));
         let left = rms_difference(&even, &flickering);
         assert!(left < 0.2 * spread, "{left} {spread}");
+    }
+
+    /// A sheen is no wider than the window of the mean, which the rows of flicker make long.
+    #[test]
+    fn a_sheen_leaves_the_texture_as_it_is() {
+        let even = normalise_locally(&picture(|_, _| 1.0));
+        let spread = rms_difference(
+            &even,
+            &GreyImage::new(SIZE.0, SIZE.1, vec![128.0; 160 * 120]),
+        );
+        let mut shining = picture(|_, _| 1.0);
+        for (k, value) in shining.data_mut().iter_mut().enumerate() {
+            let (x, y) = ((k % SIZE.0) as f32, (k / SIZE.0) as f32);
+            *value += 75.0 * (-((x - 85.0).powi(2) + (y - 55.0).powi(2)) / (2.0 * 400.0)).exp();
+        }
+        let left = rms_difference(&even, &normalise_locally(&shining));
+        assert!(left < 0.3 * spread, "{left} {spread}");
     }
 
     /// A pixel whose surroundings are clipped in part has a value that these do not distort; among

@@ -153,9 +153,8 @@ impl NoiseHistogram {
     /// by the square root of the ratio of the two parts of its derivative: no step raises the sum,
     /// and parameters stay positive.
     ///
-    /// Source: C. Févotte, N. Bertin, J.-L. Durrieu, "Nonnegative matrix factorization with the
-    /// Itakura-Saito divergence", Neural Computation 21(3), 2009, equation 4.3 and section 4 (with
-    /// the exponent 1/2).
+    /// Source: C. Févotte, J. Idier, "Algorithms for nonnegative matrix factorization with the
+    /// β-divergence", Neural Computation 23(9), 2011 (β = 0, exponent 1/2).
     pub fn fit(&self) -> NoiseModel {
         let variances = self.variances();
         let count: f64 = variances.iter().map(|v| v.count).sum();
@@ -177,7 +176,9 @@ impl NoiseHistogram {
                 let v = floor + steepness * bin.gradient_square;
                 let (falling, rising) = (bin.count * bin.variance / (v * v), bin.count / v);
                 let g2 = bin.gradient_square;
-                for (sum, term) in sums.iter_mut().zip([falling, rising, falling * g2, rising * g2])
+                for (sum, term) in sums
+                    .iter_mut()
+                    .zip([falling, rising, falling * g2, rising * g2])
                 {
                     *sum += term;
                 }
@@ -312,6 +313,26 @@ mod tests {
         let mean = 4.0 + 0.01 * (1024.0f64.powi(2) / 2.0) / 1024.0 * (1.0 + 0.0 * ln2);
         let unit = histogram.unit_variance(&model);
         assert!((unit / mean - 1.0).abs() < 0.15, "{unit} {mean}");
+    }
+
+    /// Where all frames are burnt they differ by nothing; that says nothing about the others.
+    #[test]
+    fn a_few_residuals_without_noise_do_not_hide_that_of_the_others() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+        let mut histogram = NoiseHistogram::default();
+        for k in 0..100_000u32 {
+            let g2 = 2f32.powf(10.0 * (k % 1000) as f32 / 1000.0);
+            let normal: f32 = StandardNormal.sample(&mut rng);
+            histogram.add(6.0 * normal, g2);
+        }
+        for _ in 0..1000 {
+            histogram.add(0.0, 4000.0);
+        }
+        let model = histogram.fit();
+        let deviation = (model.floor + model.steepness * 30.0).sqrt();
+        assert!((deviation / 6.0 - 1.0).abs() < 0.1, "{model:?}");
+        let none = NoiseHistogram::default().fit();
+        assert_eq!((none.floor, none.steepness), (1.0, 0.0));
     }
 
     /// Gaussian pairs with correlation 0.8, a tenth of them replaced by outliers.

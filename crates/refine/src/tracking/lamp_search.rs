@@ -100,8 +100,13 @@ mod tests {
     use tunnelstitch_geometry::surface::Surface;
     use tunnelstitch_geometry::trajectory::{Pose, spiral};
 
-    /// Five turns off the axis past a wall that a lamp lights, with noise; the lamp that is found.
-    fn found_lamp(lamp: Option<Lamp>) -> Option<Vector3<f64>> {
+    /// Five turns off the axis past a wall that a lamp lights, with noise; the lamp that is found,
+    /// by frames that were compared in the light `before`, with the exposures that these have then.
+    fn found_lamp(
+        lamp: Option<Lamp>,
+        before: Light,
+        exposure: fn(f64) -> (f64, f64),
+    ) -> Option<Vector3<f64>> {
         let mut wall = TestWall::ring(waves);
         let planned = spiral(60, 0.05, 30f64.to_radians()).into_iter().enumerate();
         let jitter = |k: usize, n: usize| 0.08 * ((1.3 + 0.7 * n as f64) * k as f64).sin();
@@ -133,21 +138,36 @@ mod tests {
         let frames = FrameCache::of_pyramids(pictures.collect());
         let prior = independent_prior(&wall.poses);
         let context = test_context(&wall, &frames, &prior);
-        let states = frame_states(&wall.poses);
+        let mut states = frame_states(&wall.poses);
+        for (k, estimate) in states.estimates.iter_mut().enumerate() {
+            (estimate.log_gain, estimate.bias) = exposure(k as f64);
+        }
+        frames.set_light(before);
         let noise = find_lamp(&context, &RefineOptions::default(), &states).unwrap()?;
         assert!((noise - 1.0).abs() < 0.3, "{noise}");
         frames.lamp_m().map(Vector3::from)
     }
 
+    const LAMP: Lamp = Lamp {
+        position: Vector3::new(0.1, -0.05, 0.08),
+        reach_m: 1.0,
+    };
+
     #[test]
     fn a_lamp_is_told_from_a_shading_by_frames_off_the_axis() {
-        let lamp = Lamp {
-            position: Vector3::new(0.1, -0.05, 0.08),
-            ..Lamp::at_camera(1.0)
-        };
-        let found = found_lamp(Some(lamp)).unwrap();
-        let error_m = (found - lamp.position * lamp.reach_m).norm();
+        let as_given = |_| (0.0, 0.0);
+        let found = found_lamp(Some(LAMP), Light::Even, as_given).unwrap();
+        let error_m = (found - LAMP.position * LAMP.reach_m).norm();
         assert!(error_m < 0.03, "{found:?}");
-        assert_eq!(found_lamp(None), None);
+        assert_eq!(found_lamp(None, Light::Even, as_given), None);
+    }
+
+    /// Normalised frames have gains and biases that are not those of the pictures.
+    #[test]
+    fn a_lamp_is_found_by_frames_that_were_normalised() {
+        let normalised = |k: f64| (0.5 * (1.1 * k).sin(), 40.0 * (0.7 * k).cos());
+        let found = found_lamp(Some(LAMP), Light::Normalised, normalised).unwrap();
+        let error_m = (found - LAMP.position * LAMP.reach_m).norm();
+        assert!(error_m < 0.03, "{found:?}");
     }
 }
