@@ -4,6 +4,7 @@ use super::file::SURVEY_FILE;
 use super::found_calibration::FoundCalibration;
 use super::joined_folders::joined;
 use super::left_aside::{LeftAside, reason_by_name, reason_of_text};
+use super::matrix_folders::{self, matrix_folders};
 use super::model_cameras::{FoundRig, camera_of};
 use super::picture_group::PictureGroup;
 use super::recorded_parts::{FoundInRecording, RecordedFrames, RecordedParts};
@@ -95,7 +96,9 @@ impl Discovery {
             ..Self::default()
         };
         let mut aside = walked.unsearched;
-        for file in &walked.files {
+        let of_matrices = matrix_folders(folder, &walked.files);
+        let files = walked.files.iter();
+        for file in files.filter(|file| !matrix_folders::holds(&of_matrices, file)) {
             let lower = extension(file).to_lowercase();
             if PICTURE_EXTENSIONS.contains(&lower.as_str()) {
                 if is_mask(file) && found.mask.is_some() {
@@ -120,6 +123,7 @@ impl Discovery {
                 aside.push((file.clone(), reason));
             }
         }
+        found.poses.extend(of_matrices);
         found.sort();
         found.find_cameras(folder);
         found.join_folders();

@@ -114,6 +114,7 @@ mod joined_folders;
 mod keyframe_selection;
 mod left_aside;
 mod masked_wall;
+mod matrix_folders;
 mod missing_poses;
 mod model_cameras;
 mod open;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub enum PoseFormat {
     /// Lines `time tx ty tz qx qy qz qw`.
     Tum,
-    /// Lines with the twelve numbers of a 3 × 4 matrix.
+    /// Lines with the twelve numbers of a 3 × 4 matrix, or a folder with a file for each.
     Kitti,
     /// A table with named columns.
     Csv,

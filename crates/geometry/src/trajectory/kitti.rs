@@ -21,7 +21,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         .collect()
 }
 
-fn parse_line(line: &str) -> Result<PoseEntry, String> {
+pub(super) fn parse_line(line: &str) -> Result<PoseEntry, String> {
     let count = row::words(line)?.len();
     let [a, b, c, d, e, f, g, h, i, j, k, l] = match count {
         WHOLE_MATRIX => first_rows(row::numbers(line, FORM)?)?,

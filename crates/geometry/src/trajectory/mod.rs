@@ -51,6 +51,7 @@ pub mod gyro;
 mod iso_time;
 mod jitter;
 pub mod kitti;
+mod matrix_files;
 mod meshroom;
 mod metashape;
 mod mount;

@@ -9,8 +9,8 @@ use super::pose_entry::PoseEntry;
 use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
 use super::{
-    bundler, colmap, colmap_binary, csv, euroc, kitti, meshroom, metashape, nerfstudio, openmvg,
-    opensfm, pix4d, realitycapture, recorded, text, tum,
+    bundler, colmap, colmap_binary, csv, euroc, kitti, matrix_files, meshroom, metashape,
+    nerfstudio, openmvg, opensfm, pix4d, realitycapture, recorded, text, tum,
 };
 use crate::recordings::is_recording;
 use std::path::{Path, PathBuf};
@@ -75,19 +75,21 @@ pub fn read_poses(path: &Path, format: Option<PoseFormat>) -> Result<PoseFile, P
     read_poses_with(path, &options)
 }
 
-/// Reads a file of poses with options. A folder is a COLMAP model, and so is a file whose name ends
-/// in `.bin`; a recording is one whose name ends in `.mcap` or
+/// Reads a file of poses with options. A folder is a COLMAP model, or has a matrix in each of its
+/// files; a file whose name ends in `.bin` is of a COLMAP model, too; a recording is one whose name ends in `.mcap` or
 /// `.bag`.
 ///
 /// # Errors
 /// Those of [`read_poses`]; a column that `options` names and the file has not.
 pub fn read_poses_with(path: &Path, options: &PoseFileOptions) -> Result<PoseFile, PoseError> {
-    let path = if path.is_dir() {
-        colmap_images(path)
-    } else {
-        path.to_owned()
-    };
+    let model = path.is_dir().then(|| colmap_images(path));
+    let has_matrices = options.format != Some(PoseFormat::Colmap)
+        && model.as_ref().is_some_and(|images| !images.exists());
+    let path = model.filter(|_| !has_matrices).unwrap_or(path.to_owned());
     let (format, parsed) = match options.format {
+        None | Some(PoseFormat::Kitti) if has_matrices => {
+            (PoseFormat::Kitti, matrix_files::read(&path)?.into())
+        }
         None | Some(PoseFormat::Colmap) if colmap_binary::is_binary(&path) => {
             (PoseFormat::Colmap, colmap_binary::read(&path)?.into())
         }
