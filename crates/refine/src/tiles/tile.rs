@@ -245,44 +245,97 @@ mod tests {
     use tunnelstitch_geometry::surface::Circle;
     use tunnelstitch_geometry::trajectory::{Pose, so3};
 
+    /// σ of a pixel of [`noisy_images`].
+    const SIGMA_GREY: f32 = 5.0;
+    /// Share of a pixel's variance that a bilinear sample has, on average.
+    const SAMPLE_SHARE: f32 = 4.0 / 9.0;
+
+    fn camera() -> Camera {
+        Camera::from_vertical_fov(160, 120, 60f64.to_radians())
+    }
+
+    /// Three frames of pure noise.
+    fn noisy_images() -> Vec<GreyImage> {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let noise = Normal::new(100.0, SIGMA_GREY).unwrap();
+        let mut image = || {
+            let data = (0..160 * 120).map(|_| noise.sample(&mut rng)).collect();
+            GreyImage::new(160, 120, data)
+        };
+        (0..3).map(|_| image()).collect()
+    }
+
+    /// The images, taken one after another by a camera that turns a little.
+    fn turned(images: &[GreyImage]) -> Vec<SampledFrame<'_>> {
+        let sampled = |(k, image)| {
+            let turn = Vector3::new(0.01, 0.02, 0.05) * k as f64;
+            let pose = Pose::new(so3::exp(&turn), Vector3::zeros());
+            SampledFrame::new(image, camera(), &FrameEstimate::at(pose))
+        };
+        images.iter().enumerate().map(sampled).collect()
+    }
+
+    /// Tiles of a lattice around the middle of the view.
+    fn tiles(grid: &WallGrid, circle: &Circle) -> Vec<TilePoints> {
+        let reach = (4.0 * grid.density) as i64;
+        (-reach..reach)
+            .flat_map(|row| (-reach..reach).map(move |column| (row, column)))
+            .map(|(row, column)| {
+                let column = column.rem_euclid(grid.columns);
+                TilePoints::new(grid, circle, TileId { column, row }, &mut Vec::new())
+            })
+            .collect()
+    }
+
+    /// σ of a pixel by the residuals of the images.
+    fn residual_sigma(images: &[GreyImage]) -> f32 {
+        let circle = Circle::new(3.0).unwrap();
+        let grid = WallGrid::new(&circle, 3.0 / camera().fy, 1.0);
+        let frames = turned(images);
+        let (mut histogram, mut spectrum) = (NoiseHistogram::default(), TextureSpectrum::default());
+        let mut workspace = TileWorkspace::default();
+        for points in tiles(&grid, &circle) {
+            let observations = frames.iter().map(|frame| TileObservation {
+                frame,
+                pixels: 1.0,
+                shade: 1.0,
+            });
+            workspace.count_residuals(&points, observations, &mut histogram, &mut spectrum);
+        }
+        (histogram.fit().floor / SAMPLE_SHARE).sqrt()
+    }
+
+    /// Wall that one frame alone has a value of has no residual.
+    #[test]
+    fn noise_is_that_of_values_of_several_frames() {
+        let whole = noisy_images();
+        let mut with_gaps = whole.clone();
+        for image in &mut with_gaps[1..] {
+            for (n, value) in image.data_mut().iter_mut().enumerate() {
+                if n % 160 > 75 {
+                    *value = f32::NAN;
+                }
+            }
+        }
+        let [whole, with_gaps] = [whole, with_gaps].map(|images| residual_sigma(&images));
+        assert!((whole / SIGMA_GREY - 1.0).abs() < 0.25, "{whole}");
+        assert!((with_gaps / whole - 1.0).abs() < 0.1, "{with_gaps} {whole}");
+    }
+
     /// Frames of pure noise, whose slopes are noise alone.
     #[test]
     fn denoised_slopes_of_pure_noise_vanish() {
         let circle = Circle::new(3.0).unwrap();
-        let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
-        let noise = Normal::new(100.0f32, 5.0).unwrap();
-        let images: Vec<GreyImage> = (0..3)
-            .map(|_| {
-                let data = (0..160 * 120).map(|_| noise.sample(&mut rng)).collect();
-                GreyImage::new(160, 120, data)
-            })
-            .collect();
-        let frames: Vec<SampledFrame> = images
-            .iter()
-            .enumerate()
-            .map(|(k, image)| {
-                let turn = Vector3::new(0.01, 0.02, 0.05) * k as f64;
-                let pose = Pose::new(so3::exp(&turn), Vector3::zeros());
-                SampledFrame::new(image, camera, &FrameEstimate::at(pose))
-            })
-            .collect();
-        // A bilinear sample has 4/9 of a pixel's variance on average.
+        let images = noisy_images();
+        let frames = turned(&images);
         let model = NoiseModel {
-            floor: 25.0 * 4.0 / 9.0,
+            floor: SIGMA_GREY * SIGMA_GREY * SAMPLE_SHARE,
             steepness: 0.0,
         };
         for density in [1.0, 2.0] {
-            let grid = WallGrid::new(&circle, 3.0 / camera.fy, density);
+            let grid = WallGrid::new(&circle, 3.0 / camera().fy, density);
             let spacing = (grid.spacing_s_m, grid.spacing_h_m);
-            let reach = (4.0 * density) as i64;
-            let tiles: Vec<TilePoints> = (-reach..reach)
-                .flat_map(|row| (-reach..reach).map(move |column| (row, column)))
-                .map(|(row, column)| {
-                    let column = column.rem_euclid(grid.columns);
-                    TilePoints::new(&grid, &circle, TileId { column, row }, &mut Vec::new())
-                })
-                .collect();
+            let tiles = tiles(&grid, &circle);
             let observations = || {
                 frames.iter().map(|frame| TileObservation {
                     frame,

@@ -62,10 +62,11 @@ impl TileWorkspace {
         means.collect()
     }
 
-    /// Counts the residuals from the plain mean of n observers into `histogram`, and the texture,
-    /// if it has no gaps, into `spectrum`.
+    /// Counts the residuals from the plain mean into `histogram`, and the texture, if it has no
+    /// gaps, into `spectrum`.
     ///
-    /// A residual is scaled by `√(n/(n−1))`, as its own value is part of the mean.
+    /// Where n observers have a value, a residual is scaled by `√(n/(n−1))`, as its own value is
+    /// part of the mean; where there is only one, it is the mean and tells nothing.
     #[inline(always)]
     pub fn count_residuals<'a>(
         &mut self,
@@ -75,9 +76,13 @@ impl TileWorkspace {
         spectrum: &mut TextureSpectrum,
     ) {
         self.sample(points, observations);
-        let n = self.frames.len() as f32;
-        let scale = (n / (n - 1.0)).sqrt();
         let mean = self.mean();
+        let mut values = ZERO_ROWS;
+        for frame in &self.frames {
+            for k in 0..ZERO_ROWS.len() {
+                values[k] += frame.valid[k + SIDE];
+            }
+        }
         if !self.has_gaps {
             spectrum.add(&mean, self.noise_gains());
         }
@@ -88,7 +93,9 @@ impl TileWorkspace {
         for frame in &self.frames {
             for k in 0..ZERO_ROWS.len() {
                 let c = k + SIDE;
-                if INTERIOR[k] * frame.valid[c] > 0.0 {
+                let n = values[k];
+                if INTERIOR[k] * frame.valid[c] > 0.0 && n > 1.0 {
+                    let scale = (n / (n - 1.0)).sqrt();
                     let e = frame.gain * (frame.values[c] - mean[c]);
                     histogram.add(scale * e, square_gain * squares[k]);
                 }
