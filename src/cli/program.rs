@@ -155,7 +155,13 @@ fn handle_interrupts(command: &Command) -> Result<(), Failure> {
         }
         std::process::exit(130);
     })
-    .map_err(|error| Failure::bug(format!("cannot watch for Ctrl-C: {error}")))
+    .map_err(|error| match error {
+        // It takes a pipe and a thread.
+        ctrlc::Error::System(source) => Failure::temporary(format!(
+            "cannot watch for Ctrl-C: {source}; allow more memory, threads or open files"
+        )),
+        error => Failure::bug(format!("cannot watch for Ctrl-C: {error}")),
+    })
 }
 
 impl Command {

@@ -102,6 +102,12 @@ fn maps_that_another_run_writes_are_temporary() {
     assert!(!folder.exists() && maps.is_dir());
 }
 
+/// Kibibytes of address space that the program itself takes, about, and so many more.
+fn program_and_kib(more: u64) -> u64 {
+    let program = std::fs::metadata(env!("CARGO_BIN_EXE_tunnelstitch")).unwrap();
+    program.len() / 1024 + more
+}
+
 #[test]
 fn too_little_memory_is_temporary() {
     let survey = first_frames(3);
@@ -115,7 +121,8 @@ fn too_little_memory_is_temporary() {
             "--threads",
             "1",
         ];
-        let output = limited("ulimit -v 42000", &arguments, "");
+        let limit = format!("ulimit -v {}", program_and_kib(12_000));
+        let output = limited(&limit, &arguments, "");
         assert_code(&output, 75);
         let message = String::from_utf8_lossy(&output.stderr);
         assert!(message.contains("of memory"), "{message}");
@@ -138,15 +145,16 @@ fn memory_that_ends_at_any_moment_is_temporary() {
         "2",
     ];
     let mut codes = Vec::new();
-    for megabytes in (40..420).step_by(38) {
-        let output = limited(&format!("ulimit -v {megabytes}000"), &arguments, "");
+    for more in (8_000..388_000).step_by(38_000) {
+        let limit = format!("ulimit -v {}", program_and_kib(more));
+        let output = limited(&limit, &arguments, "");
         let code = output.status.code();
         let message = String::from_utf8_lossy(&output.stderr);
         match code {
             Some(0) => drop(image::open(&picture).expect("a whole panorama")),
             _ => {
-                assert_eq!(code, Some(75), "{megabytes} MB: {message}");
-                assert!(message.contains("memory"), "{megabytes} MB: {message}");
+                assert_eq!(code, Some(75), "{limit}: {message}");
+                assert!(message.contains("memory"), "{limit}: {message}");
                 assert!(!picture.exists() || codes.contains(&Some(0)));
             }
         }
