@@ -101,6 +101,15 @@ impl FrameCache {
         Self::in_memory(vec![black; frames.len()], frames.masks().clone())
     }
 
+    /// Goes on with the pyramids and the light of a cache of the first of these frames.
+    pub fn continuing(self, earlier: Self) -> Self {
+        Self {
+            light: earlier.light,
+            shelf: earlier.shelf,
+            ..self
+        }
+    }
+
     fn in_memory(pyramids: Vec<Arc<Pyramid>>, masks: Masks) -> Self {
         Self {
             levels: 1,
@@ -264,6 +273,20 @@ mod tests {
             assert_eq!(get(frame).unwrap(), 10.0 + frame as f32);
         }
         assert!(get(3).is_err());
+    }
+
+    #[test]
+    fn more_frames_are_read_after_those_that_are_known() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = files(folder.path());
+        let first = FrameCache::new(&files.first(2), [32, 24], 1, 1 << 20);
+        first.set_light(Light::Normalised);
+        first.get(1).unwrap();
+        std::fs::remove_file(&files[1].path).unwrap();
+        let all = FrameCache::new(&files, [32, 24], 1, 1 << 20).continuing(first);
+        assert_eq!(all.frames(), 5);
+        assert!(matches!(all.light(), Light::Normalised));
+        assert!(all.get(1).is_ok() && all.get(4).is_ok());
     }
 
     #[test]
