@@ -19,10 +19,8 @@ pub const PREVIEW_FILES: [&str; 2] = [POSES_FILE, PICTURE_FILE];
 
 /// Frames that wait for being tracked, at the most: of more, only some are tracked.
 const MAX_QUEUE: usize = 20;
-/// Pixels of a frame along each side of one of the picture of the wall.
-const SHRINK: f64 = 4.0;
-/// Memory for frames that are tracked, bytes: those that may overlap.
-const CACHE_BYTES: usize = 1 << 30;
+/// Pixels of a frame as it is tracked along each side of one of the picture of the wall.
+const SHRINK: f64 = 2.0;
 
 /// An error of following frames.
 #[derive(Debug, thiserror::Error)]
@@ -66,7 +64,7 @@ impl LivePreview {
         let capture = Capture::open(survey, change)?;
         Ok(capture.map(|capture| Self {
             capture,
-            tracking: LiveTracking::new(CACHE_BYTES),
+            tracking: LiveTracking::new(),
             wall: None,
             drawn: 0,
             looked: Instant::now(),
@@ -122,19 +120,20 @@ impl LivePreview {
         if poses.is_empty() {
             return Ok(());
         }
-        let native = native_px_per_metre(surface, &survey.cameras, &poses[..1]);
+        let input = RefineInput::from(survey);
+        let (camera, levels) = tracking.camera(&input);
+        let native = native_px_per_metre(surface, camera, &poses[..1]);
         let native = native.map_err(|error| error.to_string())?;
-        let wall = self
-            .wall
-            .get_or_insert_with(|| LiveWall::new(surface, native / SHRINK));
-        let side = survey.cameras.shorter_side();
+        let new = || LiveWall::new(surface, native / SHRINK);
+        let wall = self.wall.get_or_insert_with(new);
+        let level = level_for(camera.width.min(camera.height), native, wall.px_per_metre());
+        let level = level.min(levels - 1);
+        let camera = camera.at_level(level);
         for (frame, pose) in poses.iter().enumerate().skip(self.drawn) {
-            let shown = tracking.shows_wall(frame);
-            let pyramid = shown.then(|| tracking.pyramid(frame)).flatten();
-            let pyramid = pyramid.and_then(Result::ok);
-            let level = level_for(side, native, wall.px_per_metre()).min(tracking.levels(side) - 1);
-            let picture = pyramid.as_ref().map(|pyramid| pyramid.level(level));
-            let camera = survey.cameras.of(frame).at_level(level);
+            let pyramid = tracking
+                .pyramid(frame)
+                .filter(|_| tracking.shows_wall(frame));
+            let picture = pyramid.map(|pyramid| pyramid.level(level));
             let added = wall.add(surface, &camera, pose, picture);
             added.map_err(|error| format!("frame {frame}: {error}"))?;
         }

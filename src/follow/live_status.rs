@@ -83,10 +83,16 @@ impl LiveStatus {
     /// The problems of the capture, a sentence each with its remedy.
     pub fn warnings(&self) -> Vec<String> {
         let missing = self.missing.iter().take(MAX_NAMED_FRAMES).map(|missing| {
-            format!(
-                "{} frames are missing between {} and {}",
-                missing.count, missing.before, missing.after
-            )
+            let MissingFrames {
+                count,
+                before,
+                after,
+            } = missing;
+            let frames = match count {
+                1 => "1 frame is".to_owned(),
+                _ => format!("{count} frames are"),
+            };
+            format!("{frames} missing between {before} and {after}")
         });
         let set_aside = self.set_aside.iter().take(MAX_NAMED_FRAMES);
         let set_aside = set_aside

@@ -9,10 +9,14 @@ use crate::model::rejection::RejectionReason;
 use crate::options::{Photometry, RefineOptions, ShapeMode};
 use crate::parameters::calibration::Kappa;
 use crate::stages::setup::Setup;
+use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
 use crate::tracking::prescreening::is_featureless;
 use crate::tracking::track::Tracking;
 use std::sync::Arc;
-use tunnelstitch_core::frames::{FrameCache, FrameError, Light, Pyramid, noise_sigma};
+use tunnelstitch_core::frames::{
+    FrameCache, FrameSet, GreyImage, Pyramid, StoredFrame, noise_sigma, normalise_locally,
+};
+use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::median::upper_median;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::trajectory::Pose;
@@ -20,14 +24,19 @@ use tunnelstitch_geometry::trajectory::Pose;
 /// Pyramid levels that frames are tracked on, from the coarsest. More are more exact than a preview
 /// shows, and take longer than cameras give.
 const TRACKING_LEVELS: usize = 2;
+/// Pixels of the shorter side of the frames that are tracked, at the least; frames are halved as
+/// long as they have more.
+const MIN_SIDE: u32 = 200;
 /// Frames by which the noise of the sensor is known, at the most.
 const NOISE_FRAMES: usize = 32;
 
 /// Frames that are tracked while they are taken.
 pub struct LiveTracking {
     options: RefineOptions,
-    /// The grey pyramids of the frames tracked so far.
-    frames: Option<FrameCache>,
+    /// The grey pyramids of the frames so far: halved, locally normalised. Those that no further
+    /// frame can overlap are replaced by the first one, which is empty.
+    pyramids: Vec<Arc<Pyramid>>,
+    empty: Arc<Pyramid>,
     tracking: Tracking,
     /// 1-σ of the noise of the first frames, grey levels.
     noises: Vec<f64>,
@@ -47,28 +56,37 @@ pub struct LiveCounts {
     pub skipped: usize,
 }
 
+impl Default for LiveTracking {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl LiveTracking {
-    /// Tracking that has not begun, in a cache of `cache_bytes` for frames.
-    pub fn new(cache_bytes: usize) -> Self {
+    /// Tracking that has not begun.
+    pub fn new() -> Self {
         Self {
             options: RefineOptions {
                 calibrate: Some(Vec::new()),
                 shape: ShapeMode::Fixed,
                 photometry: Photometry::Normalised,
                 tracking_levels: TRACKING_LEVELS,
-                cache_bytes,
                 ..RefineOptions::default()
             },
-            frames: None,
+            pyramids: Vec::new(),
+            empty: Arc::new(Pyramid::new(GreyImage::new(1, 1, vec![f32::NAN]), 1)),
             tracking: Tracking::open_ended(Kappa::zeros()),
             noises: Vec::new(),
             skipped: 0,
         }
     }
 
-    /// Number of levels of the frames' pyramids, for frames whose shorter side has `side` pixels.
-    pub fn levels(&self, side: u32) -> usize {
-        self.options.coarsest_level(side) + 1
+    /// The camera of the first level of the frames' pyramids, and the number of levels.
+    pub fn camera(&self, input: &RefineInput) -> (Camera, usize) {
+        let level = halvings(input.cameras.shorter_side());
+        let camera = input.cameras.of(0).at_level(level);
+        let levels = self.options.coarsest_level(camera.width.min(camera.height)) + 1;
+        (camera, levels)
     }
 
     /// Number of frames tracked so far, those that do not match or were skipped included.
@@ -106,12 +124,11 @@ impl LiveTracking {
         matches!(rejection, Some(None | Some(RejectionReason::LeftOut)))
     }
 
-    /// The locally normalised grey pyramid of a frame.
-    ///
-    /// # Errors
-    /// A frame that cannot be decoded.
-    pub fn pyramid(&self, frame: usize) -> Option<Result<Arc<Pyramid>, FrameError>> {
-        self.frames.as_ref().map(|frames| frames.get(frame))
+    /// The grey pyramid of a frame, locally normalised; None of one that no further frame can
+    /// overlap, or that shows nothing.
+    pub fn pyramid(&self, frame: usize) -> Option<&Pyramid> {
+        let pyramid = self.pyramids.get(frame)?;
+        (!Arc::ptr_eq(pyramid, &self.empty)).then_some(pyramid)
     }
 
     /// Tracks the frames that `input` has beyond those tracked so far, but for those that
@@ -123,23 +140,33 @@ impl LiveTracking {
     pub fn track(
         &mut self,
         input: &RefineInput,
-        is_skipped: impl Fn(usize) -> bool + Sync,
+        is_skipped: impl Fn(usize) -> bool,
     ) -> Result<(), RefineError> {
-        if input.frames.len() < 2 || is_motionless(input.initial) {
+        let first = self.frames();
+        if input.frames.len() < 2 || input.frames.len() == first || is_motionless(input.initial) {
             return Ok(());
         }
-        let (first, options) = (self.frames(), self.options.clone());
-        let mut setup = Setup::new(input.clone(), &options)?;
-        match self.frames.take() {
-            Some(frames) => setup.frames = setup.frames.continuing(frames),
-            None => setup.frames.set_light(Light::Normalised),
-        }
-        let rejections: Vec<Option<RejectionReason>> =
-            (first..setup.count()).par_map(|k| match is_skipped(k) {
-                true => Some(RejectionReason::LeftOut),
-                false => reject_empty(&setup, k),
-            });
-        self.measure_noise(&setup, first, &rejections);
+        let options = self.options.clone();
+        let level = halvings(input.cameras.shorter_side());
+        let cameras = input.cameras.at_level(level);
+        let levels = options.coarsest_level(cameras.shorter_side()) + 1;
+        let read = |k: usize| read_pyramid(input.frames, k, (input.cameras.size(), level), levels);
+        let pyramids: Vec<Option<Pyramid>> = (first..input.frames.len()).par_map(read);
+        let rejections = (first..).zip(&pyramids).map(|(k, pyramid)| match pyramid {
+            None => Some(RejectionReason::Featureless),
+            Some(_) if is_skipped(k) => Some(RejectionReason::LeftOut),
+            Some(_) => None,
+        });
+        let rejections: Vec<Option<RejectionReason>> = rejections.collect();
+        self.keep(pyramids);
+        let mut setup = Setup::new(
+            RefineInput {
+                cameras,
+                ..input.clone()
+            },
+            &options,
+        )?;
+        setup.frames = FrameCache::of_pyramids(self.pyramids.iter().cloned());
         let noise = upper_median(self.noises.clone()).unwrap_or(0.0);
         let context = EstimationContext {
             prior: &setup.tracking_prior,
@@ -150,34 +177,55 @@ impl LiveTracking {
             self.tracking.append(rejection);
             self.tracking.track_next(&context, &options)?;
         }
-        self.frames = Some(setup.frames);
         Ok(())
     }
 
-    /// Measures the noise of further frames, as long as there are few.
-    fn measure_noise(
-        &mut self,
-        setup: &Setup,
-        first: usize,
-        rejections: &[Option<RejectionReason>],
-    ) {
-        let left = NOISE_FRAMES.saturating_sub(self.noises.len());
-        let usable = (first..)
-            .zip(rejections)
-            .filter(|(_, reason)| reason.is_none());
-        for (k, _) in usable.take(left) {
-            if let Ok(pyramid) = setup.frames.get(k) {
+    /// Keeps the pyramids of further frames, and drops those that none can overlap any more;
+    /// measures their noise, as long as there are few.
+    fn keep(&mut self, pyramids: Vec<Option<Pyramid>>) {
+        for pyramid in pyramids {
+            if let Some(pyramid) = pyramid
+                .as_ref()
+                .filter(|_| self.noises.len() < NOISE_FRAMES)
+            {
                 self.noises.extend(noise_sigma(pyramid.level(0)));
             }
+            let kept = pyramid.map_or_else(|| Arc::clone(&self.empty), Arc::new);
+            self.pyramids.push(kept);
+        }
+        let first = self.frames().saturating_sub(MAX_OVERLAP_DISTANCE_FRAMES);
+        let gone = self.pyramids[..first].iter_mut().rev();
+        for pyramid in gone.take_while(|pyramid| !Arc::ptr_eq(pyramid, &self.empty)) {
+            *pyramid = Arc::clone(&self.empty);
         }
     }
 }
 
-/// Rejects a frame that shows nothing or cannot be decoded.
-fn reject_empty(setup: &Setup, frame: usize) -> Option<RejectionReason> {
-    let is_empty = match setup.frames.get(frame) {
-        Ok(pyramid) => is_featureless(pyramid.level(setup.coarsest_level())),
-        Err(_) => true,
-    };
-    is_empty.then_some(RejectionReason::Featureless)
+/// Number of times that frames whose shorter side has `side` pixels are halved.
+fn halvings(side: u32) -> usize {
+    let mut level = 0;
+    while side >> (level + 1) >= MIN_SIDE {
+        level += 1;
+    }
+    level
+}
+
+/// The pyramid of a frame of `size` (width and height, pixels), halved `level` times and locally
+/// normalised; None if it shows nothing or cannot be decoded.
+fn read_pyramid(
+    frames: &FrameSet,
+    frame: usize,
+    ([width, height], level): ([u32; 2], usize),
+    levels: usize,
+) -> Option<Pyramid> {
+    let stored = StoredFrame::decode(&frames[frame], width, height);
+    let mut image = stored.ok()?.grey();
+    if let Some(mask) = frames.masks().of(frame) {
+        mask.blank(&mut image);
+    }
+    for _ in 0..level {
+        image = image.halved();
+    }
+    let pyramid = Pyramid::new(normalise_locally(&image), levels);
+    (!is_featureless(pyramid.level(levels - 1))).then_some(pyramid)
 }

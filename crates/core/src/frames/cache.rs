@@ -88,8 +88,9 @@ impl FrameCache {
     }
 
     /// Creates a cache of pyramids that are in memory already.
-    pub fn of_pyramids(pyramids: Vec<Pyramid>) -> Self {
-        Self::in_memory(pyramids.into_iter().map(Arc::new).collect(), Masks::NONE)
+    pub fn of_pyramids(pyramids: impl IntoIterator<Item = impl Into<Arc<Pyramid>>>) -> Self {
+        let pyramids = pyramids.into_iter().map(Into::into);
+        Self::in_memory(pyramids.collect(), Masks::NONE)
     }
 
     /// Pictures that are black all over in place of `frames`, of `size` (width and height at any
@@ -99,15 +100,6 @@ impl FrameCache {
         let black = GreyImage::new(width, height, vec![0.0; width * height]);
         let black = Arc::new(Pyramid::new(black, 1));
         Self::in_memory(vec![black; frames.len()], frames.masks().clone())
-    }
-
-    /// Goes on with the pyramids and the light of a cache of the first of these frames.
-    pub fn continuing(self, earlier: Self) -> Self {
-        Self {
-            light: earlier.light,
-            shelf: earlier.shelf,
-            ..self
-        }
     }
 
     fn in_memory(pyramids: Vec<Arc<Pyramid>>, masks: Masks) -> Self {
@@ -273,20 +265,6 @@ mod tests {
             assert_eq!(get(frame).unwrap(), 10.0 + frame as f32);
         }
         assert!(get(3).is_err());
-    }
-
-    #[test]
-    fn more_frames_are_read_after_those_that_are_known() {
-        let folder = tempfile::tempdir().unwrap();
-        let files = files(folder.path());
-        let first = FrameCache::new(&files.first(2), [32, 24], 1, 1 << 20);
-        first.set_light(Light::Normalised);
-        first.get(1).unwrap();
-        std::fs::remove_file(&files[1].path).unwrap();
-        let all = FrameCache::new(&files, [32, 24], 1, 1 << 20).continuing(first);
-        assert_eq!(all.frames(), 5);
-        assert!(matches!(all.light(), Light::Normalised));
-        assert!(all.get(1).is_ok() && all.get(4).is_ok());
     }
 
     #[test]
