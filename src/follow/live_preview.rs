@@ -168,7 +168,7 @@ impl LivePreview {
         Ok(outputs.commit()?)
     }
 
-    /// What has become of the frames so far.
+    /// The state of the frames so far.
     ///
     /// # Errors
     /// None that is known: gaps are found in memory.

@@ -1,4 +1,4 @@
-//! What has become of the frames so far, in words.
+//! The state of the frames so far, in words.
 
 use crate::refine::LiveCounts;
 use crate::render::Gap;
@@ -10,7 +10,7 @@ const MAX_NAMED_GAPS: usize = 2;
 /// Most frames in a warning.
 const MAX_NAMED_FRAMES: usize = 5;
 
-/// What has become of the frames so far.
+/// The state of the frames so far.
 #[derive(Clone, Debug)]
 pub struct LiveStatus {
     /// Number of pictures in the folder.

@@ -117,8 +117,8 @@ impl LiveTracking {
         counts
     }
 
-    /// True if frame `frame` shows the wall at its pose, as far as is known: unless it shows nothing
-    /// or does not match.
+    /// True if frame `frame` shows the wall at its pose, as far as is known: unless it shows
+    /// nothing or does not match.
     pub fn shows_wall(&self, frame: usize) -> bool {
         let rejection = self.tracking.states().rejections.get(frame);
         matches!(rejection, Some(None | Some(RejectionReason::LeftOut)))
@@ -228,4 +228,81 @@ fn read_pyramid(
     }
     let pyramid = Pyramid::new(normalise_locally(&image), levels);
     (!is_featureless(pyramid.level(levels - 1))).then_some(pyramid)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scene::bricks;
+    use nalgebra::{Vector2, Vector3};
+    use tunnelstitch_core::test_wall::TestWall;
+    use tunnelstitch_geometry::surface::{Surface, shortest_arc};
+    use tunnelstitch_geometry::trajectory::{
+        Jitter, JitterModel, StampedPose, indexed, poses_of, so3,
+    };
+
+    /// The frames of a wall, of which one is black, and initial poses with an error of each step.
+    fn survey(black: usize) -> (TestWall, FrameSet, Vec<StampedPose>) {
+        let wall = TestWall::ring(bricks);
+        let pictures = wall.samples(|k, _, _, value| if k == black { 0.0 } else { value });
+        let [width, height] = [wall.camera.width, wall.camera.height];
+        let pictures = pictures
+            .into_iter()
+            .filter_map(|picture| Some(image::GrayImage::from_raw(width, height, picture)?.into()));
+        let frames = FrameSet::in_memory(pictures);
+        let error = so3::exp(&Vector3::new(0.02, -0.015, 0.025));
+        let mut initial = vec![wall.poses[0]];
+        for pair in wall.poses.windows(2) {
+            let step = pair[0].r_wc.inverse() * pair[1].r_wc * error;
+            let turned = initial[initial.len() - 1].r_wc * step;
+            initial.push(Pose::new(turned, pair[1].t_wc));
+        }
+        (wall, frames, indexed(initial))
+    }
+
+    /// The last frame but one is skipped, and the last one is black: without them, each overlaps the
+    /// one before.
+    #[test]
+    fn frames_are_tracked_as_they_come() {
+        let (wall, frames, initial) = survey(13);
+        let jitter = Jitter {
+            model: JitterModel::RandomWalk,
+            rotation_sigma_rad: 0.03,
+            translation_sigma_m: [0.03; 3],
+        };
+        let surface: Arc<dyn Surface> = Arc::new(wall.circle);
+        let mut tracking = LiveTracking::new();
+        for count in [1, 2, 5, 5, 9, 14] {
+            let frames = frames.first(count);
+            let surface = Arc::clone(&surface);
+            let input = RefineInput::new(wall.camera, surface, &frames, &initial[..count], jitter);
+            tracking.track(&input, |frame| frame == 12).unwrap();
+            assert_eq!(tracking.frames(), if count == 1 { 0 } else { count });
+        }
+        let expected = LiveCounts {
+            tracked: 12,
+            empty: 1,
+            unmatched: 0,
+            skipped: 1,
+        };
+        assert_eq!(tracking.counts(), expected);
+        assert!(tracking.shows_wall(12) && !tracking.shows_wall(13));
+        assert!(tracking.pyramid(12).is_some() && tracking.pyramid(13).is_none());
+        // Steps on the wall between neighbours, which no gauge changes.
+        let wall_at = |pose: &Pose| {
+            let hit = wall.circle.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()));
+            hit.unwrap().wall
+        };
+        let step = |poses: &[Pose], k: usize| {
+            let [from, to] = [wall_at(&poses[k]), wall_at(&poses[k + 1])];
+            let around_m = shortest_arc(to.s_m - from.s_m, wall.perimeter_m());
+            Vector2::new(around_m, to.h_m - from.h_m)
+        };
+        let error_m = |poses: &[Pose]| {
+            let errors = (0..11).map(|k| (step(poses, k) - step(&wall.poses, k)).norm_squared());
+            (errors.sum::<f64>() / 11.0).sqrt()
+        };
+        let [before_m, after_m] = [poses_of(&initial), tracking.poses()].map(|p| error_m(&p));
+        assert!(after_m < 0.5 * before_m, "{after_m} m, {before_m} m before");
+    }
 }

@@ -40,7 +40,8 @@ use std::sync::Arc;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch refine my-survey --out refined\n  \
-    tunnelstitch refine my-survey --out refined --calibrate focal,radius\n\n\
+    tunnelstitch refine my-survey --out refined --calibrate focal,radius\n  \
+    tunnelstitch refine my-survey --out refined --follow\n\n\
     A long survey in two shards, on two machines, and joined:\n  \
     tunnelstitch refine my-survey --shard 1/2 --out shards\n  \
     tunnelstitch refine my-survey --shard 2/2 --out shards\n  \

@@ -151,8 +151,8 @@ impl Capture {
     }
 
     /// Takes the frames that have been completed since the last call and have a pose, in the order
-    /// of their names. Those that come after frames that were taken already, cannot be read, or have
-    /// no pose although later ones have, are set aside.
+    /// of their names. Those that come after frames that were taken already, cannot be read, or
+    /// have no pose although later ones have, are set aside.
     ///
     /// # Errors
     /// A folder that cannot be listed.

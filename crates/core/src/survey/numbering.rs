@@ -38,12 +38,8 @@ fn step(before: &FrameFile, after: &FrameFile) -> Option<u64> {
 /// The last number in the name of a frame without its extension.
 fn number(frame: &FrameFile) -> Option<u64> {
     let stem = frame.path.file_stem()?.to_str()?;
-    let digits = stem.split(|c: char| !c.is_ascii_digit());
-    digits
-        .filter(|digits| !digits.is_empty())
-        .last()?
-        .parse()
-        .ok()
+    let mut digits = stem.split(|c: char| !c.is_ascii_digit());
+    digits.rfind(|digits| !digits.is_empty())?.parse().ok()
 }
 
 #[cfg(test)]

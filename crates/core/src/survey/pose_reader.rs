@@ -187,7 +187,6 @@ impl<'a> PoseReader<'a> {
             axes: self.section.camera_axes.unwrap_or(convention.axes),
             camera_in_body: self.camera_in_body,
             tunnel_in_world: self.tunnel_in_world,
-            ..convention
         }
     }
 

@@ -177,9 +177,7 @@ impl NoiseHistogram {
                 let v = floor + steepness * bin.gradient_square;
                 let (falling, rising) = (bin.count * bin.variance / (v * v), bin.count / v);
                 let g2 = bin.gradient_square;
-                for (sum, term) in sums
-                    .iter_mut()
-                    .zip([falling, rising, falling * g2, rising * g2])
+                for (sum, term) in sums.iter_mut().zip([falling, rising, falling * g2, rising * g2])
                 {
                     *sum += term;
                 }

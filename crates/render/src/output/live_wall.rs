@@ -17,6 +17,8 @@ use tunnelstitch_geometry::trajectory::Pose;
 
 /// Pixels of the picture around the tunnel, at the most.
 const MAX_COLUMNS: f64 = 720.0;
+/// Pixels of the picture at the most: 1 GiB.
+const MAX_PIXELS: f64 = 1.34e8;
 /// Area of the smallest gap that is reported, pixels.
 const MIN_GAP_PX: f64 = 64.0;
 const GREY: PixelFormat = PixelFormat {
@@ -69,11 +71,22 @@ impl LiveWall {
     ) -> Result<(), SurfaceError> {
         let footprint = Footprint::trace(surface, camera, pose)?;
         self.footprints.push(footprint);
-        if let Some(picture) = picture {
+        if let Some(picture) = picture.filter(|_| self.has_room(&footprint)) {
             self.make_room(&footprint);
             self.draw(surface, camera, pose, (picture, &footprint));
         }
         Ok(())
+    }
+
+    /// False if the canvas would become too large: a pose is far from all others.
+    fn has_room(&self, footprint: &Footprint) -> bool {
+        let [start_m, end_m] = match self.canvas.rows {
+            0 => [footprint.h_min_m, footprint.h_max_m],
+            _ => self.canvas.chainage_m(),
+        };
+        let length_m = footprint.h_max_m.max(end_m) - footprint.h_min_m.min(start_m);
+        let rows = length_m * self.canvas.px_per_metre;
+        rows * f64::from(self.canvas.columns) <= MAX_PIXELS
     }
 
     /// Adds rows at either end for what a frame sees.
@@ -224,8 +237,8 @@ fn passed_m(footprints: &[Footprint], perimeter_m: f64) -> Option<[f64; 2]> {
     (range[0] < range[1]).then_some(range)
 }
 
-/// Number of frames in a sequence from the first on until the camera has turned around once; None if
-/// it does not.
+/// Number of frames in a sequence from the first on until the camera has turned around once; None
+/// if it does not.
 fn turn_of<'a>(
     footprints: impl Iterator<Item = &'a Footprint> + Clone,
     perimeter_m: f64,

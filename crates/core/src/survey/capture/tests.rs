@@ -15,7 +15,8 @@ impl Folder {
     fn new(poses: usize) -> Self {
         let dir = tempfile::tempdir().unwrap();
         let toml = "[frames]\nimages = \"frames/*.png\"\n[camera]\nfile = \"camera.json\"\n\
-                    [tunnel]\nshape = \"circle\"\nradius_m = 1.0\n[poses]\ninitial = \"poses.tum\"\n\
+                    [tunnel]\nshape = \"circle\"\nradius_m = 1.0\n\
+                    [poses]\ninitial = \"poses.tum\"\n\
                     [prior]\nmodel = \"random-walk\"\nrotation_sigma_deg = 1.0\n\
                     translation_sigma_m = [0.01, 0.01, 0.01]\n";
         let camera = r#"{"model": "pinhole", "width": 32, "height": 24, "fx": 30.0, "fy": 30.0,
