@@ -58,8 +58,8 @@
 //! [`super_resolve`] solves for the wall finer than any frame, for panoramas and poses alike;
 //! [`raster`] writes pictures larger than the memory; [`evaluate`] measures; [`report`] makes a
 //! page of it all; [`follow`] shows the frames while they are taken; [`inspect`] puts the panorama
-//! on the wall in three dimensions; [`jobs`] does it for many surveys, [`network_map`] shows them on
-//! a map; [`cli`] prints.
+//! on the wall in three dimensions; [`jobs`] does it for many surveys, [`network_map`] shows them
+//! on a map; [`cli`] prints.
 //!
 //! # The order of the folders
 //!

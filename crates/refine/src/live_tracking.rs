@@ -260,8 +260,8 @@ mod tests {
         (wall, frames, indexed(initial))
     }
 
-    /// The last frame but one is skipped, and the last one is black: without them, each overlaps the
-    /// one before.
+    /// The last frame but one is skipped, and the last one is black: without them, each overlaps
+    /// the one before.
     #[test]
     fn frames_are_tracked_as_they_come() {
         let (wall, frames, initial) = survey(13);

@@ -71,9 +71,11 @@ impl LiveWall {
     ) -> Result<(), SurfaceError> {
         let footprint = Footprint::trace(surface, camera, pose)?;
         self.footprints.push(footprint);
-        if let Some(picture) = picture.filter(|_| self.has_room(&footprint)) {
+        if self.has_room(&footprint) {
             self.make_room(&footprint);
-            self.draw(surface, camera, pose, (picture, &footprint));
+            if let Some(picture) = picture {
+                self.draw(surface, camera, pose, (picture, &footprint));
+            }
         }
         Ok(())
     }
@@ -261,13 +263,13 @@ mod tests {
     use tunnelstitch_geometry::surface::Circle;
     use tunnelstitch_geometry::trajectory::spiral;
 
-    /// A wall that a spiral of five turns of twelve frames shows, but for some frames.
-    fn wall(shows: impl Fn(usize) -> bool, is_backward: bool) -> (Circle, LiveWall) {
+    /// A wall that some frames of a spiral show, twelve a turn.
+    fn wall(frames: usize, shows: impl Fn(usize) -> bool, is_backward: bool) -> (Circle, LiveWall) {
         let circle = Circle::new(1.0).unwrap();
         let camera = Camera::from_vertical_fov(80, 60, 60f64.to_radians());
         let picture = GreyImage::new(80, 60, vec![100.0; 80 * 60]);
         let mut wall = LiveWall::new(&circle, 30.0);
-        let mut poses = spiral(60, 0.03, TAU / 12.0);
+        let mut poses = spiral(frames, 0.03, TAU / 12.0);
         if is_backward {
             poses.reverse();
         }
@@ -281,7 +283,7 @@ mod tests {
     #[test]
     fn the_wall_between_the_first_and_the_last_turn_has_no_gap() {
         for is_backward in [false, true] {
-            let (circle, wall) = wall(|_| true, is_backward);
+            let (circle, wall) = wall(60, |_| true, is_backward);
             assert_eq!(wall.gaps(&circle).unwrap(), []);
             let picture = wall.picture(&circle).unwrap().unwrap();
             assert!(picture.pixels().any(|pixel| pixel.0 == [100; 3]));
@@ -293,7 +295,7 @@ mod tests {
     fn a_side_that_nothing_shows_is_a_gap() {
         for is_backward in [false, true] {
             let hidden = |k: usize| (12..48).contains(&k) && k % 12 < 5;
-            let (circle, wall) = wall(|k| !hidden(k), is_backward);
+            let (circle, wall) = wall(60, |k| !hidden(k), is_backward);
             let gaps = wall.gaps(&circle).unwrap();
             assert_eq!(gaps.len(), 1, "{gaps:?}");
             let width_deg = gaps[0].angle_to_deg - gaps[0].angle_from_deg;
@@ -301,19 +303,27 @@ mod tests {
         }
     }
 
+    /// Frames from the fourth turn on show nothing, which the camera is past only later.
     #[test]
     fn what_is_not_passed_yet_is_no_gap() {
-        let (circle, wall) = wall(|k| k < 36, false);
-        let gaps = wall.gaps(&circle).unwrap();
-        // The fourth turn is passed, the fifth is under way.
+        let (circle, five_turns) = wall(60, |k| k < 36, false);
+        assert_eq!(five_turns.gaps(&circle).unwrap(), []);
+        let (circle, ten_turns) = wall(120, |k| k < 36, false);
+        let gaps = ten_turns.gaps(&circle).unwrap();
         assert_eq!(gaps.len(), 1, "{gaps:?}");
-        assert!(gaps[0].chainage_to_m < 48.0 * 0.03, "{gaps:?}");
-        assert!(wall.picture(&circle).unwrap().is_some());
+        let (from_m, to_m) = (gaps[0].chainage_from_m, gaps[0].chainage_to_m);
         assert!(
-            LiveWall::new(&circle, 30.0)
-                .picture(&circle)
-                .unwrap()
-                .is_none()
+            from_m > 1.0 && to_m > 2.0 && to_m < 108.0 * 0.03,
+            "{gaps:?}"
         );
+        assert_eq!(gaps[0].angle_to_deg - gaps[0].angle_from_deg, 360.0);
+    }
+
+    #[test]
+    fn there_is_no_picture_of_nothing() {
+        let circle = Circle::new(1.0).unwrap();
+        let nothing = LiveWall::new(&circle, 30.0);
+        assert!(nothing.picture(&circle).unwrap().is_none());
+        assert_eq!(nothing.gaps(&circle).unwrap(), []);
     }
 }
