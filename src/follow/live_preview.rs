@@ -18,7 +18,7 @@ const PICTURE_FILE: &str = "preview.png";
 pub const PREVIEW_FILES: [&str; 2] = [POSES_FILE, PICTURE_FILE];
 
 /// Frames that wait for being tracked, at the most: of more, only some are tracked.
-const MAX_QUEUE: usize = 20;
+const MAX_QUEUE: usize = 12;
 /// Pixels of a frame as it is tracked along each side of one of the picture of the wall.
 const SHRINK: f64 = 2.0;
 
