@@ -68,7 +68,6 @@ impl LiveStatus {
 
     /// The gaps in words; None if there are none.
     pub fn gap_text(&self) -> Option<String> {
-        self.gaps.first()?;
         let others = self.gaps.len().saturating_sub(MAX_NAMED_GAPS);
         let named = self.gaps.iter().take(MAX_NAMED_GAPS).map(gap_in_words);
         let named: Vec<String> = named.collect();
@@ -77,7 +76,7 @@ impl LiveStatus {
         } else {
             String::new()
         };
-        Some(format!("GAPS: {}{more}", named.join("; ")))
+        (!named.is_empty()).then(|| format!("GAPS: {}{more}", named.join("; ")))
     }
 
     /// The problems of the capture, a sentence each with its remedy.
@@ -99,7 +98,7 @@ impl LiveStatus {
             .map(|frame| format!("{} is not in the preview: {}", frame.file, frame.reason));
         let more = |what: &str, count: usize| {
             let count = count.saturating_sub(MAX_NAMED_FRAMES);
-            (count > 0).then(|| format!("{what} of {count} more"))
+            (count > 0).then(|| format!("{what} {count} more"))
         };
         let waiting = (self.waiting > 0).then(|| {
             format!(
@@ -109,13 +108,16 @@ impl LiveStatus {
         });
         let failure = self.failure.iter();
         let failure = failure.map(|why| format!("the preview has ended early: {why}"));
-        (missing.chain(more("so are frames at places", self.missing.len())))
-            .chain(set_aside)
-            .chain(more("so are frames", self.set_aside.len()))
-            .chain(waiting)
-            .chain(failure)
-            .chain(self.poses_error.clone())
-            .collect()
+        (missing.chain(more(
+            "frames are missing in gaps of the numbering:",
+            self.missing.len(),
+        )))
+        .chain(set_aside)
+        .chain(more("not in the preview are", self.set_aside.len()))
+        .chain(waiting)
+        .chain(failure)
+        .chain(self.poses_error.clone())
+        .collect()
     }
 }
 
@@ -131,4 +133,51 @@ fn gap_in_words(gap: &Gap) -> String {
         "{:.2} to {:.2} m, {around}, {:.3} m²",
         gap.chainage_from_m, gap.chainage_to_m, gap.area_m2
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_is_counted_and_named() {
+        let missing = |count| MissingFrames {
+            count,
+            before: "4.png".to_owned(),
+            after: "9.png".to_owned(),
+        };
+        let status = LiveStatus {
+            pictures: 30,
+            waiting: 0,
+            counts: LiveCounts {
+                tracked: 25,
+                unmatched: 2,
+                ..LiveCounts::default()
+            },
+            lag: Duration::from_millis(240),
+            chainage_m: Some(1.5),
+            gaps: Vec::new(),
+            missing: vec![missing(1); 7],
+            set_aside: vec![SetAside {
+                file: "3.png".to_owned(),
+                reason: "it came after 4.png".to_owned(),
+            }],
+            poses_error: None,
+            failure: None,
+        };
+        let expected = "30 frames, 25 tracked, 2 do not match, 7 missing, 1 set aside, lag 0.2 s, \
+                        at 1.50 m";
+        assert_eq!(status.line(), expected);
+        let warnings = status.warnings();
+        assert_eq!(warnings[0], "1 frame is missing between 4.png and 9.png");
+        assert_eq!(
+            warnings[5],
+            "frames are missing in gaps of the numbering: 2 more"
+        );
+        assert_eq!(
+            warnings[6],
+            "3.png is not in the preview: it came after 4.png"
+        );
+        assert_eq!(warnings.len(), 7);
+    }
 }
