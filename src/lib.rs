@@ -57,8 +57,9 @@
 //! (the simulator not even the ray–wall intersection, so that it can judge the others);
 //! [`super_resolve`] solves for the wall finer than any frame, for panoramas and poses alike;
 //! [`raster`] writes pictures larger than the memory; [`evaluate`] measures; [`report`] makes a
-//! page of it all; [`inspect`] puts the panorama on the wall in three dimensions; [`jobs`] does it
-//! for many surveys, [`network_map`] shows them on a map; [`cli`] prints.
+//! page of it all; [`follow`] shows the frames while they are taken; [`inspect`] puts the panorama
+//! on the wall in three dimensions; [`jobs`] does it for many surveys, [`network_map`] shows them
+//! on a map; [`cli`] prints.
 //!
 //! # The order of the folders
 //!
@@ -73,9 +74,9 @@
 //! | `crates` | `geometry` < `core` < `photometry`, `super_resolve` < `refine`, `render`, `simulate` < `evaluate` < `src` |
 //! | `crates/geometry` | `files`, `numerics` < `recordings` < `camera` < `trajectory` < `surface` |
 //! | `crates/core` | `bitmap_text`, `colour_map`, `persist`, `points`, `progress` < `raster`, `frames`, `storage` < `survey`, `test_wall` |
-//! | `crates/refine` | `thresholds`, `options` < `parameters` < `linear` < `points` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `point_fit` < `comparison` < `tracking` < `validation` < `uncertainty` < `verdict` < `report` < `refined` < `stages` < `pipeline` < `deformation_bound`, `reading_search`, `shards` |
+//! | `crates/refine` | `thresholds`, `options` < `parameters` < `linear` < `points` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `point_fit` < `comparison` < `tracking` < `validation` < `uncertainty` < `verdict` < `report` < `refined` < `stages` < `pipeline` < `deformation_bound`, `live_tracking`, `reading_search`, `shards` |
 //! | `crates/render` | `error` < `layout` < `warp` < `sampling` < `compositing` < `output` |
-//! | `src` | `check` < `report`, `inspect` < `jobs` < `network_map` < `cli` |
+//! | `src` | `check`, `follow` < `report`, `inspect` < `jobs` < `network_map` < `cli` |
 //!
 //! <!-- end of the order -->
 //!
@@ -140,6 +141,7 @@
 pub mod check;
 #[doc(hidden)]
 pub mod cli;
+pub mod follow;
 pub mod inspect;
 pub mod jobs;
 pub mod network_map;

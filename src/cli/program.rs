@@ -7,7 +7,8 @@ use super::commands::{
 use super::configuration;
 use super::help::group_commands;
 use super::output::{
-    Failure, RunRecord, Terminal, print_error, print_failures_as_json, refused_arguments,
+    Failure, RunRecord, Terminal, end_capture, print_error, print_failures_as_json,
+    refused_arguments,
 };
 use crate::jobs::end_processes;
 use crate::persist::atomic;
@@ -141,13 +142,17 @@ pub fn run() -> Result<(), Failure> {
     cli.command.run(&command, &record, &terminal)
 }
 
-/// Removes unfinished files on Ctrl-C and ends the program with 130, the code that shells expect.
+/// Ends a capture that is followed on Ctrl-C; else removes unfinished files and ends the program
+/// with 130, the code that shells expect.
 fn handle_interrupts(command: &Command) -> Result<(), Failure> {
     let is_resumable = matches!(
         command,
         Command::Refine(_) | Command::Stitch(_) | Command::RunJob(_)
     );
     ctrlc::set_handler(move || {
+        if end_capture() {
+            return;
+        }
         end_processes();
         atomic::remove_unfinished();
         if is_resumable {

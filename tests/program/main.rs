@@ -16,6 +16,7 @@ mod exit_codes;
 mod export;
 mod faults;
 mod fittings;
+mod follow;
 mod fuzzed;
 mod gis;
 mod gopro;

@@ -61,7 +61,7 @@ pub fn with_context<T>(
     function: impl FnOnce(&EstimationContext, &FrameStates) -> T,
 ) -> T {
     let pyramids = pictures.into_iter().map(|frame| Pyramid::new(frame, 1));
-    let frames = FrameCache::of_pyramids(pyramids.collect());
+    let frames = FrameCache::of_pyramids(pyramids);
     let prior = independent_prior(poses);
     let context = test_context(wall, &frames, &prior);
     function(&context, &frame_states(poses))

@@ -67,6 +67,7 @@ pub use layout::wall_point::{FramePixelError, hit_of_pixel};
 pub use output::budget::Budget;
 pub use output::cylinder;
 pub use output::gaps::{Coverage, Gap, gaps_csv};
+pub use output::live_wall::LiveWall;
 pub use output::maps::Map;
 pub use output::memory::available_bytes;
 pub use output::panorama::Panorama;

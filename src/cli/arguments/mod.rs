@@ -14,9 +14,11 @@
 //! | [`as_built`] | deviation of a simulated wall from its drawing, cables and lamps |
 //! | [`simulation`] | degradations of a simulated survey, its wall and its jitter |
 //! | [`imaging`] | lamp, lens, sensor and files of a simulated survey |
+//! | [`follow`] | following frames while they are taken |
 //! | [`resume`] | continuing an interrupted run |
 
 mod as_built;
+mod follow;
 mod frame_times;
 mod imaging;
 mod input_file;
@@ -31,6 +33,7 @@ mod textures;
 mod tunnel;
 
 pub use as_built::{AsBuiltArguments, DeformationArguments};
+pub use follow::FollowArguments;
 pub use frame_times::{FrameTimesArguments, clock_times};
 pub use imaging::ImagingArguments;
 pub use input_file::input_file;

@@ -256,7 +256,7 @@ impl PoseReadingArguments {
 
     /// Writes the flags into a survey's file. Their paths are relative to the working folder, not
     /// to the survey's.
-    fn apply_to(&self, file: &mut SurveyFile) {
+    pub fn apply_to(&self, file: &mut SurveyFile) {
         let poses = &mut file.poses;
         replace(&mut poses.format, self.pose_format.map(Into::into));
         poses.columns.extend(self.pose_columns.iter().cloned());

@@ -19,6 +19,7 @@ pub mod plan_job;
 pub mod project;
 pub mod refine;
 pub mod refine_files;
+pub mod refine_follow;
 pub mod refine_memory;
 pub mod refine_shards;
 pub mod refine_summary;

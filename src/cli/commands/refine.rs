@@ -4,18 +4,21 @@ use crate::check::{
     JOIN_SHARE, join_bytes, refine_bytes, refine_s, shard_bytes, shard_share, unused_bits_warning,
 };
 use crate::cli::arguments::{
-    PoseReadingArguments, ResumeArguments, input_file, positive, rate, resume, share,
+    FollowArguments, PoseReadingArguments, ResumeArguments, input_file, positive, rate, resume,
+    share,
 };
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::commands::refine_files::{
     FOUND_FILES, REFINED_FILES, check_outputs, stage_refined,
 };
+use crate::cli::commands::refine_follow::follow;
 use crate::cli::commands::refine_memory::check_memory;
 use crate::cli::commands::refine_shards::{read_shards, write_shard};
 use crate::cli::commands::refine_summary::{print_outputs, print_summary};
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
 };
+use crate::follow::PREVIEW_FILES;
 use crate::progress::Progress;
 use crate::refine::{
     FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, ShardNumber,
@@ -37,7 +40,8 @@ use std::sync::Arc;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch refine my-survey --out refined\n  \
-    tunnelstitch refine my-survey --out refined --calibrate focal,radius\n\n\
+    tunnelstitch refine my-survey --out refined --calibrate focal,radius\n  \
+    tunnelstitch refine my-survey --out refined --follow\n\n\
     A long survey in two shards, on two machines, and joined:\n  \
     tunnelstitch refine my-survey --shard 1/2 --out shards\n  \
     tunnelstitch refine my-survey --shard 2/2 --out shards\n  \
@@ -122,6 +126,8 @@ pub struct RefineArguments {
     /// Also print the table of global solves and the time of each stage.
     #[arg(long, short)]
     verbose: bool,
+    #[command(flatten)]
+    follow: FollowArguments,
     #[command(flatten)]
     reading: PoseReadingArguments,
     #[command(flatten)]
@@ -211,6 +217,10 @@ pub fn run(
 ) -> Result<(), Failure> {
     let options = arguments.options();
     let points = arguments.points.as_deref();
+    if arguments.follow.follow && !arguments.dry_run.is_set() {
+        let (survey, out) = (&arguments.survey, &arguments.out);
+        follow(survey, out, &arguments.reading, &arguments.follow, terminal)?;
+    }
     let mut survey = (arguments.reading).open(&arguments.survey, points, terminal)?;
     check_outputs(&survey, &arguments.out)?;
     check_memory(&survey, arguments.memory_bytes(&survey))?;
@@ -250,6 +260,11 @@ pub fn run(
         )?;
         record.add_to(&mut outputs, &arguments.out.join(RUN_FILE), &inputs)?;
         let files = outputs.file_names();
+        if arguments.follow.follow {
+            for name in PREVIEW_FILES {
+                outputs.remove(&arguments.out.join(name))?;
+            }
+        }
         outputs.commit()?;
         Ok((refined.report, json, files))
     })?;

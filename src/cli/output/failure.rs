@@ -3,6 +3,7 @@
 use crate::camera::CalibrationError;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::converge::ConvergeError;
+use crate::follow::FollowError;
 use crate::frames::FrameError;
 use crate::inspect::InspectError;
 use crate::jobs::JobError;
@@ -163,6 +164,16 @@ impl From<SurveyError> for Failure {
         match error {
             SurveyError::Storage(error) => error.into(),
             _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<FollowError> for Failure {
+    fn from(error: FollowError) -> Self {
+        match error {
+            FollowError::Survey(error) => error.into(),
+            FollowError::Write(error) => error.into(),
+            FollowError::Render(error) => error.into(),
         }
     }
 }

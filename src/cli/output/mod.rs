@@ -5,6 +5,7 @@ mod dry_run;
 mod duration;
 mod failure;
 mod failure_output;
+mod interrupt;
 mod job_clock;
 pub mod json;
 mod label;
@@ -18,6 +19,7 @@ pub use dry_run::{DryRunArguments, Job};
 pub use duration::duration_text;
 pub use failure::Failure;
 pub use failure_output::{print_failure, print_failures_as_json, refused_arguments};
+pub use interrupt::{FollowedCapture, end_capture};
 pub use paths::{
     check_parent_folder, own_program, picture_format, refuse_overwriting, survey_files,
 };

@@ -88,8 +88,9 @@ impl FrameCache {
     }
 
     /// Creates a cache of pyramids that are in memory already.
-    pub fn of_pyramids(pyramids: Vec<Pyramid>) -> Self {
-        Self::in_memory(pyramids.into_iter().map(Arc::new).collect(), Masks::NONE)
+    pub fn of_pyramids(pyramids: impl IntoIterator<Item = impl Into<Arc<Pyramid>>>) -> Self {
+        let pyramids = pyramids.into_iter().map(Into::into);
+        Self::in_memory(pyramids.collect(), Masks::NONE)
     }
 
     /// Pictures that are black all over in place of `frames`, of `size` (width and height at any

@@ -55,6 +55,11 @@ impl FrameFile {
         }
     }
 
+    /// True unless the end of its picture file is missing, as while it is written.
+    pub fn is_whole(&self) -> bool {
+        !matches!(self.source, FrameSource::File(_)) || matches!(truncation(&self.path), Ok(None))
+    }
+
     /// Refuses another size than that of the calibration.
     fn check_size(&self, found: (u32, u32), expected: (u32, u32)) -> Result<(), FrameError> {
         if found == expected {

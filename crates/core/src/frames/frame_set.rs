@@ -29,6 +29,12 @@ impl FrameSet {
         Self::new(files.collect(), Masks::NONE)
     }
 
+    /// Adds a frame at the end, numbered by its place.
+    pub fn push(&mut self, file: FrameFile) {
+        let index = self.files.len();
+        self.files.push(file.numbered(index));
+    }
+
     /// The masks.
     pub fn masks(&self) -> &Masks {
         &self.masks

@@ -74,6 +74,14 @@ pub(super) fn by_order(
         .collect())
 }
 
+/// Associates the poses that a file has yet with frames by their indices, in the convention of the
+/// file.
+pub(super) fn present_by_order(file: &PoseFile, frames: &[FrameFile]) -> Vec<Option<StampedPose>> {
+    let entry = |frame: &FrameFile| file.entries.get(frame.index);
+    let pose = |frame: &FrameFile| entry(frame).map(|entry| stamped(entry, frame.index, None));
+    frames.iter().map(pose).collect()
+}
+
 /// The remedy for other numbers of poses and frames: to move away pictures that are no frames, or
 /// another association.
 fn count_remedy(file: &PoseFile, frames: &[FrameFile], times_s: Option<&[f64]>) -> String {

@@ -74,6 +74,7 @@ pub struct Survey {
 }
 
 /// Poses of a file in the tunnel's frame, one per frame.
+#[derive(Default)]
 pub(super) struct ReadPoses {
     /// The poses.
     pub trajectory: Trajectory,
@@ -173,38 +174,14 @@ impl Survey {
         if let Some(step_deg) = survey.file.frames.angle_step_deg {
             survey.select_keyframes(step_deg, &toml_path, planned.as_ref())?;
         }
-        let section = &survey.file.poses;
-        let read = survey.read_as(
-            section,
-            &survey.folder.join(&section.initial),
-            match section.as_built {
-                Some(true) => survey.surface.as_ref(),
-                _ => planned.as_ref(),
-            },
-            section.missing_poses(),
-        )?;
-        let initial = match section.as_built {
-            Some(true) => read.trajectory,
-            _ => survey.carried(read.trajectory),
-        };
-        let mut warnings = read.warnings;
-        let truth = match &section.truth {
-            Some(truth) => {
-                let section = PosesSection {
-                    shift_frames: None,
-                    ..section.clone()
-                };
-                let read = survey.read_as(
-                    &section,
-                    &survey.folder.join(truth),
-                    survey.surface.as_ref(),
-                    MissingPoses::Refuse,
-                )?;
-                warnings.extend(read.warnings);
-                Some(read.trajectory)
-            }
-            None => None,
-        };
+        let mut read = survey.read_initial(planned.as_ref())?;
+        let initial = std::mem::take(&mut read.trajectory);
+        let mut warnings = std::mem::take(&mut read.warnings);
+        let truth = survey.read_truth()?;
+        let truth = truth.map(|read| {
+            warnings.extend(read.warnings);
+            read.trajectory
+        });
         for section in survey.file.camera.all() {
             warnings.extend(readout_warning(section, &survey.folder));
         }
@@ -220,6 +197,40 @@ impl Survey {
         survey.pose_gaps = read.gaps;
         survey.validate_readout().map_err(value)?;
         Ok(survey)
+    }
+
+    /// Reads the initial poses, in the tunnel `planned` or as it was built; none where they are
+    /// awaited.
+    fn read_initial(&self, planned: &dyn Surface) -> Result<ReadPoses, SurveyError> {
+        let section = &self.file.poses;
+        if section.is_awaited {
+            return Ok(ReadPoses::default());
+        }
+        let path = self.folder.join(&section.initial);
+        let missing = section.missing_poses();
+        if section.as_built == Some(true) {
+            return self.read_as(section, &path, self.surface.as_ref(), missing);
+        }
+        let read = self.read_as(section, &path, planned, missing)?;
+        Ok(ReadPoses {
+            trajectory: self.carried(read.trajectory),
+            ..read
+        })
+    }
+
+    /// Reads the true poses, if there are any and none are awaited.
+    fn read_truth(&self) -> Result<Option<ReadPoses>, SurveyError> {
+        let section = &self.file.poses;
+        let Some(truth) = section.truth.as_ref().filter(|_| !section.is_awaited) else {
+            return Ok(None);
+        };
+        let section = PosesSection {
+            shift_frames: None,
+            ..section.clone()
+        };
+        let (path, surface) = (self.folder.join(truth), self.surface.as_ref());
+        let read = self.read_as(&section, &path, surface, MissingPoses::Refuse)?;
+        Ok(Some(read))
     }
 
     /// Reads a file of poses in the tunnel, as `refine` and `convert` write them, in its format's

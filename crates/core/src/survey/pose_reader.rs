@@ -1,6 +1,8 @@
 //! Reading of a pose file to one pose per frame in the tunnel's frame.
 
-use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by_order, by_time};
+use super::associate::{
+    Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by_order, by_time, present_by_order,
+};
 use super::clock_slip::ClockSlip;
 use super::error::SurveyError;
 use super::file::FramesSection;
@@ -17,7 +19,7 @@ use std::borrow::Cow;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::{
-    Convention, Pose, PoseFile, PoseFileOptions, PoseFormat, TimeUnit, Trajectory,
+    Convention, Pose, PoseFile, PoseFileOptions, PoseFormat, StampedPose, TimeUnit, Trajectory,
     read_camera_in_body, read_poses_with, read_tunnel_frame,
 };
 
@@ -87,11 +89,7 @@ impl<'a> PoseReader<'a> {
         let is_rig = self.frames.pictures.len() > self.frames.frames.len();
         let options = self.section.file_options(is_rig);
         let file = read_poses_with(path, &options)?.later(self.section.time_offset_s);
-        let mut convention = Convention::of(file.format);
-        convention.direction = self.section.convention.unwrap_or(convention.direction);
-        convention.axes = self.section.camera_axes.unwrap_or(convention.axes);
-        convention.camera_in_body = self.camera_in_body;
-        convention.tunnel_in_world = self.tunnel_in_world;
+        let convention = self.convention(&file);
         if file.format == PoseFormat::Euroc && convention.camera_in_body.is_none() && !is_rig {
             return Err(SurveyError::Association {
                 path: file.path,
@@ -181,16 +179,75 @@ impl<'a> PoseReader<'a> {
         }
     }
 
+    /// The convention of a file of poses.
+    fn convention(&self, file: &PoseFile) -> Convention {
+        let convention = Convention::of(file.format);
+        Convention {
+            direction: self.section.convention.unwrap_or(convention.direction),
+            axes: self.section.camera_axes.unwrap_or(convention.axes),
+            camera_in_body: self.camera_in_body,
+            tunnel_in_world: self.tunnel_in_world,
+        }
+    }
+
+    /// Reads the poses of frames from a file that may not have all of them yet, in the tunnel's
+    /// frame. By order, poses belong to the frames' indices.
+    ///
+    /// # Errors
+    /// A malformed file; a file without names, times or frames' times by which poses are to be
+    /// associated.
+    pub fn read_present(&self, path: &Path) -> Result<Vec<Option<StampedPose>>, SurveyError> {
+        let file = read_poses_with(path, &self.section.file_options(false))?
+            .later(self.section.time_offset_s);
+        let convention = self.convention(&file);
+        let frames = self.frames.frames;
+        let default = match file.has_names() {
+            true => Associate::Name,
+            false => Associate::Order,
+        };
+        let given = match self.section.associate().unwrap_or(default) {
+            Associate::Order => present_by_order(&file, frames),
+            Associate::Name => by_name(&file, frames, None)?,
+            Associate::Time => self.present_by_time(&file)?,
+        };
+        let unit_m = self.section.unit_m.unwrap_or(1.0);
+        let in_tunnel = |stamped: StampedPose| {
+            let Pose { r_wc, t_wc } = stamped.pose;
+            StampedPose {
+                time_s: stamped.time_s,
+                pose: convention.to_tunnel(&Pose::new(r_wc, unit_m * t_wc)),
+            }
+        };
+        let given = given.into_iter();
+        Ok(given.map(|stamped| stamped.map(in_tunnel)).collect())
+    }
+
+    /// Associates the poses that a file has with frames by their times.
+    fn present_by_time(&self, file: &PoseFile) -> Result<Vec<Option<StampedPose>>, SurveyError> {
+        let how = self.time_association();
+        let (frames, times_s) = (self.frames.frames, self.frame_times()?);
+        let each = (0..frames.len()).map(|k| {
+            let found = by_time(file, &frames[k..=k], &times_s[k..=k], how);
+            found.ok().and_then(|poses| poses.first().copied())
+        });
+        Ok(each.collect())
+    }
+
+    /// The parameters of the association by time.
+    fn time_association(&self) -> TimeAssociation {
+        TimeAssociation {
+            tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
+            interpolate: self.section.interpolate.unwrap_or(false),
+        }
+    }
+
     /// Associates the poses of a file by the times of the frames, and names its contradictions.
     /// Where they do not fit, but do in other units, the error names these.
     fn associate_by_time(
         &self,
         file: &PoseFile,
     ) -> Result<(Trajectory, Vec<FrameConflict>), SurveyError> {
-        let how = TimeAssociation {
-            tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
-            interpolate: self.section.interpolate.unwrap_or(false),
-        };
+        let how = self.time_association();
         let frames = self.frames.frames;
         let associated = self.frame_times().and_then(|times_s| {
             let given = by_time(file, frames, &times_s, how)?;

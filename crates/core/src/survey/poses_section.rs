@@ -88,6 +88,10 @@ pub struct PosesSection {
     /// a file with names leaves out start between their neighbours. No key of `survey.toml`.
     #[serde(skip)]
     pub is_complete: bool,
+    /// True while frames are being taken: no poses are read when the survey is opened
+    /// ([`Capture`](super::capture::Capture)). No key of `survey.toml`.
+    #[serde(skip)]
+    pub is_awaited: bool,
 }
 
 impl PosesSection {

@@ -74,6 +74,8 @@ pub enum RejectionReason {
         /// Number of frames that were tried.
         failures: usize,
     },
+    /// It was not looked at: tracking was behind the camera.
+    LeftOut,
     /// Too little texture to determine the pose.
     Uncertain {
         /// 1-σ on the wall, pixels.
@@ -182,6 +184,7 @@ impl fmt::Display for RejectionReason {
                  many do not"
             ),
             Self::Unsolved => write!(f, "the equations of the survey have no solution"),
+            Self::LeftOut => write!(f, "it was not looked at, since tracking was behind"),
             Self::Uncertain { wall_px } if !wall_px.is_finite() => write!(
                 f,
                 "the other frames do not tell its position on the wall: too little texture, or \

@@ -57,13 +57,12 @@ pub fn prescreen(
         for (k, (picture, noise)) in (start..).zip(pictures) {
             size = (picture.width(), picture.height());
             sums.resize(size.0 * size.1, [0.0; 2]);
-            let (mean, spread, known) = compute_moments(&picture);
+            let (mean, ..) = compute_moments(&picture);
             let repeated = last[k % cameras].as_ref().filter(|(earlier, other)| {
                 rms_difference(other, &picture) < MAX_REPEAT_DIFFERENCE_GREY
                     && has_moved(context, *earlier, k, coarsest)
             });
-            // With fewer known pixels no pose has the overlap that registration asks for.
-            rejections.push(if known < MIN_OVERLAP_SHARE || spread < MIN_CONTRAST_GREY {
+            rejections.push(if is_featureless(&picture) {
                 Some(RejectionReason::Featureless)
             } else {
                 repeated.map(|(earlier, _)| RejectionReason::Repeated(*earlier))
@@ -92,6 +91,13 @@ pub fn prescreen(
         rejections,
         mean: has_enough.then_some(mean),
     })
+}
+
+/// True for a frame, at the coarsest pyramid level, that shows nothing to be compared.
+pub fn is_featureless(picture: &GreyImage) -> bool {
+    let (_, spread, known) = compute_moments(picture);
+    // With fewer known pixels no pose has the overlap that registration asks for.
+    known < MIN_OVERLAP_SHARE || spread < MIN_CONTRAST_GREY
 }
 
 /// Mean and standard deviation of a picture, grey levels, and its share of pixels with a value.

@@ -118,7 +118,7 @@ mod tests {
             });
             Pyramid::new(GreyImage::new(w, h, lit.collect()), 1)
         });
-        let frames = FrameCache::of_pyramids(pictures.collect());
+        let frames = FrameCache::of_pyramids(pictures);
         let prior = independent_prior(&wall.poses);
         let context = test_context(&wall, &frames, &prior);
         let states = frame_states(&wall.poses);

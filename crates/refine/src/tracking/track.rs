@@ -53,6 +53,8 @@ pub struct Tracking {
     frames_since_window: usize,
     /// True if the pose of the last tracked frame was reliable.
     was_reliable: bool,
+    /// True while frames are taken, so that others may follow those that are known.
+    is_open_ended: bool,
 }
 
 impl Tracking {
@@ -73,7 +75,21 @@ impl Tracking {
             effort: Effort::default(),
             frames_since_window: 0,
             was_reliable: true,
+            is_open_ended: false,
         }
+    }
+
+    /// Tracking of frames that are still to be taken, none of which is known.
+    pub fn open_ended(kappa: Kappa) -> Self {
+        Self {
+            is_open_ended: true,
+            ..Self::new(Vec::new(), kappa)
+        }
+    }
+
+    /// Appends a frame, with the reason if it is rejected before it is tracked.
+    pub fn append(&mut self, rejection: Option<RejectionReason>) {
+        self.states.rejections.push(rejection);
     }
 
     /// The number of frames tracked so far, rejected ones included.
@@ -89,7 +105,7 @@ impl Tracking {
 
     /// True if all frames are tracked.
     pub fn is_complete(&self) -> bool {
-        self.tracked_frames() == self.states.rejections.len()
+        !self.is_open_ended && self.tracked_frames() == self.states.rejections.len()
     }
 
     /// The states of the frames tracked so far, without the others.
@@ -97,6 +113,11 @@ impl Tracking {
         let mut states = self.states.clone();
         states.rejections.truncate(states.estimates.len());
         states
+    }
+
+    /// The estimates of the frames tracked so far; the rejection reasons of all that are known.
+    pub fn states(&self) -> &FrameStates {
+        &self.states
     }
 
     /// The states of all frames.

@@ -114,7 +114,7 @@ pub fn pose_bounds(
     let frames = fine
         .iter()
         .map(|frame| Pyramid::new(average_pixels(frame), 1));
-    let frames = FrameCache::of_pyramids(frames.collect());
+    let frames = FrameCache::of_pyramids(frames);
     // The motion during readout hardly changes the information.
     let shutter = Shutter::default();
     let flat = EstimationContext {

@@ -8,12 +8,14 @@
 //! | panorama in memory | [`panorama`] |
 //! | panorama in a raster file, and small with axes | [`raster_target`], [`preview`] |
 //! | wall that no frame shows | [`gaps`] |
+//! | wall while frames are taken | [`live_wall`] |
 //! | resolution and uncertainty over the wall | [`maps`] |
 //! | one photo on a cylinder around its camera | [`cylinder`] |
 
 pub mod budget;
 pub mod cylinder;
 pub mod gaps;
+pub mod live_wall;
 pub mod maps;
 pub mod memory;
 pub mod panorama;
