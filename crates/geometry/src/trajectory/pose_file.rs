@@ -76,8 +76,8 @@ pub fn read_poses(path: &Path, format: Option<PoseFormat>) -> Result<PoseFile, P
 }
 
 /// Reads a file of poses with options. A folder is a COLMAP model, or has a matrix in each of its
-/// files; a file whose name ends in `.bin` is of a COLMAP model, too; a recording is one whose name ends in `.mcap` or
-/// `.bag`.
+/// files; a file whose name ends in `.bin` is of a COLMAP model, too; a recording is one whose name
+/// ends in `.mcap` or `.bag`.
 ///
 /// # Errors
 /// Those of [`read_poses`]; a column that `options` names and the file has not.

@@ -79,8 +79,8 @@ impl TileWorkspace {
         let mean = self.mean();
         let mut values = ZERO_ROWS;
         for frame in &self.frames {
-            for k in 0..ZERO_ROWS.len() {
-                values[k] += frame.valid[k + SIDE];
+            for (n, valid) in values.iter_mut().zip(&frame.valid[SIDE..]) {
+                *n += valid;
             }
         }
         if !self.has_gaps {
