@@ -3,16 +3,16 @@
 use super::file::SURVEY_FILE;
 use super::found_calibration::FoundCalibration;
 use super::joined_folders::joined;
-use super::left_aside::{LeftAside, reason_by_name, reason_of_text};
+use super::left_aside::{AsideReason, LeftAside, reason_by_name, reason_of_text};
 use super::matrix_folders::{self, matrix_folders};
 use super::model_cameras::{FoundRig, camera_of};
 use super::picture_group::PictureGroup;
 use super::recorded_parts::{FoundInRecording, RecordedFrames, RecordedParts};
+use super::refusal::SurveyPart;
 use super::straight_axis::{AXIS_FILE, FoundAxis};
 use super::walked_folder::WalkedFolder;
 use crate::frames::{FrameError, PictureOrientation, Video};
 use std::collections::BTreeMap;
-use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::recordings::is_recording;
 use tunnelstitch_geometry::trajectory::gyro::gopro_readout_ms;
@@ -20,10 +20,6 @@ use tunnelstitch_geometry::trajectory::{
     DuplicateTimes, PoseEntry, PoseFile, PoseFileOptions, read_poses_with,
 };
 
-/// Larger files are not tried as calibrations.
-const MAX_CALIBRATION_BYTES: u64 = 4 << 20;
-/// Larger files are not tried as poses.
-const MAX_POSES_BYTES: u64 = 256 << 20;
 /// Extensions of pictures.
 const PICTURE_EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
 
@@ -95,14 +91,17 @@ impl Discovery {
             pictures: picture_files(&walked.files).iter().map(group).collect(),
             ..Self::default()
         };
-        let mut aside = walked.unsearched;
+        let unsearched = walked.unsearched.into_iter();
+        let mut aside: Vec<(PathBuf, AsideReason)> = unsearched
+            .map(|(path, reason)| (path, reason.into()))
+            .collect();
         let of_matrices = matrix_folders(folder, &walked.files);
         let files = walked.files.iter();
         for file in files.filter(|file| !matrix_folders::holds(&of_matrices, file)) {
             let lower = extension(file).to_lowercase();
             if PICTURE_EXTENSIONS.contains(&lower.as_str()) {
                 if is_mask(file) && found.mask.is_some() {
-                    aside.push((file.clone(), "there is another mask".to_owned()));
+                    aside.push((file.clone(), "there is another mask".into()));
                 } else if is_mask(file) {
                     found.mask = Some(file.clone());
                 }
@@ -112,10 +111,10 @@ impl Discovery {
                 match FoundInRecording::of(folder, file) {
                     Ok(recorded) => {
                         let reasons = recorded.refusals.iter();
-                        aside.extend(reasons.map(|reason| (file.clone(), reason.clone())));
+                        aside.extend(reasons.map(|reason| (file.clone(), reason.as_str().into())));
                         found.take_recording(file, recorded);
                     }
-                    Err(reason) => aside.push((file.clone(), reason)),
+                    Err(reason) => aside.push((file.clone(), reason.into())),
                 }
             } else if !file.ends_with(SURVEY_FILE)
                 && let Err(reason) = found.take_text(folder, file, &lower)
@@ -204,8 +203,13 @@ impl Discovery {
     /// Takes a file as calibration, as poses or as both.
     ///
     /// # Errors
-    /// The reason why it is neither, in words.
-    fn take_text(&mut self, folder: &Path, file: &Path, extension: &str) -> Result<(), String> {
+    /// The reason why it is neither.
+    fn take_text(
+        &mut self,
+        folder: &Path,
+        file: &Path,
+        extension: &str,
+    ) -> Result<(), AsideReason> {
         let path = folder.join(file);
         let bytes = path.metadata().map_or(0, |metadata| metadata.len());
         let mut refusals = Vec::new();
@@ -213,14 +217,13 @@ impl Discovery {
         if is_calibration(file, extension) {
             is_tried = true;
             let size = || self.picture_size();
-            match read_up_to(MAX_CALIBRATION_BYTES, bytes, || {
-                FoundCalibration::read(folder, file, &size)
-            }) {
+            let read = || FoundCalibration::read(folder, file, &size);
+            match SurveyPart::Calibration.read(bytes, read) {
                 Ok(found) => {
                     is_taken = true;
                     self.calibrations.push(found);
                 }
-                Err(error) => refusals.push(format!("no calibration: {error}")),
+                Err(refusal) => refusals.push(refusal),
             }
         }
         if is_pose_file(file, extension) {
@@ -230,18 +233,18 @@ impl Discovery {
                 duplicate_times: DuplicateTimes::Merge,
                 ..PoseFileOptions::default()
             };
-            match read_up_to(MAX_POSES_BYTES, bytes, || read_poses_with(&path, &options)) {
+            match SurveyPart::Poses.read(bytes, || read_poses_with(&path, &options)) {
                 Ok(poses) => {
                     is_taken = true;
                     self.poses.push((file.to_owned(), poses));
                 }
-                Err(error) => refusals.push(format!("no poses: {error}")),
+                Err(refusal) => refusals.push(refusal),
             }
         }
         match (is_taken, is_tried) {
             (true, _) => Ok(()),
             (false, true) => Err(reason_of_text(folder, file, &refusals)),
-            (false, false) => Err(reason_by_name(folder, file, extension)),
+            (false, false) => Err(reason_by_name(folder, file, extension).into()),
         }
     }
 
@@ -429,21 +432,6 @@ fn is_truth(path: &Path) -> bool {
 
 /// The pictures of a folder with an extension, in lower case.
 type PictureFiles<'a> = BTreeMap<(PathBuf, String), Vec<&'a PathBuf>>;
-
-/// Reads a file of `bytes` bytes, if it is not larger than allowed.
-///
-/// # Errors
-/// The error of reading, or the size, in words.
-fn read_up_to<T, E: Display>(
-    max_bytes: u64,
-    bytes: u64,
-    read: impl FnOnce() -> Result<T, E>,
-) -> Result<T, String> {
-    if bytes > max_bytes {
-        return Err(format!("larger than {} MiB", max_bytes >> 20));
-    }
-    read().map_err(|error| error.to_string())
-}
 
 #[cfg(test)]
 mod tests {

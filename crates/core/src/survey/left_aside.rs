@@ -1,5 +1,6 @@
 //! Files of a folder that are no part of the survey found in it, with the reasons.
 
+use super::refusal::{Refusal, SurveyPart};
 use crate::frames::{RAW_EXTENSIONS, UnreadFormat};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -32,6 +33,25 @@ pub struct LeftAside {
     pub count: usize,
     /// The reason.
     pub reason: String,
+    /// The parts of a survey that the file would hold, were it not faulty.
+    #[serde(skip)]
+    faulty: Vec<SurveyPart>,
+}
+
+/// The reason why a file is left aside.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct AsideReason {
+    text: String,
+    faulty: Vec<SurveyPart>,
+}
+
+impl<T: Into<String>> From<T> for AsideReason {
+    fn from(text: T) -> Self {
+        Self {
+            text: text.into(),
+            faulty: Vec::new(),
+        }
+    }
 }
 
 impl LeftAside {
@@ -47,12 +67,12 @@ impl LeftAside {
 
     /// True for a file that was recognised as poses, but is faulty.
     pub fn is_faulty_pose_file(&self) -> bool {
-        is_faulty(&self.reason, "no poses: ")
+        self.faulty.contains(&SurveyPart::Poses)
     }
 
     /// True for a file that was recognised as a calibration, but is faulty.
     pub fn is_faulty_calibration(&self) -> bool {
-        is_faulty(&self.reason, "no calibration: ")
+        self.faulty.contains(&SurveyPart::Calibration)
     }
 
     /// The extension in lower case.
@@ -62,8 +82,8 @@ impl LeftAside {
     }
 
     /// Files with their reasons; those of one folder with the same extension and reason are one.
-    pub(super) fn grouped(files: Vec<(PathBuf, String)>) -> Vec<Self> {
-        let mut groups: BTreeMap<(PathBuf, String, String), Vec<PathBuf>> = BTreeMap::new();
+    pub(super) fn grouped(files: Vec<(PathBuf, AsideReason)>) -> Vec<Self> {
+        let mut groups: BTreeMap<(PathBuf, String, AsideReason), Vec<PathBuf>> = BTreeMap::new();
         for (file, reason) in files {
             let folder = file.parent().unwrap_or(Path::new("")).to_owned();
             let extension = file.extension().unwrap_or_default();
@@ -71,7 +91,8 @@ impl LeftAside {
             let group = groups.entry((folder, extension, reason)).or_default();
             group.push(file);
         }
-        let group = |((folder, extension, reason), files): ((PathBuf, String, _), Vec<PathBuf>)| {
+        let group = |(key, files): ((PathBuf, String, AsideReason), Vec<PathBuf>)| {
+            let (folder, extension, reason) = key;
             let pattern = match files.as_slice() {
                 [file] => slashed(file),
                 _ if extension.is_empty() => slashed(&folder.join("*")),
@@ -80,24 +101,12 @@ impl LeftAside {
             Self {
                 pattern,
                 count: files.len(),
-                reason,
+                reason: reason.text,
+                faulty: reason.faulty,
             }
         };
         groups.into_iter().map(group).collect()
     }
-}
-
-/// The refusals of files that are of another kind altogether.
-const OTHER_KINDS: [&str; 3] = [
-    "not a calibration known",
-    "in no known format",
-    "holds no poses",
-];
-
-/// True for a reason with a refusal, behind `mark`, of a file that is of the right kind.
-fn is_faulty(reason: &str, mark: &str) -> bool {
-    let refusal = reason.split("; ").find_map(|part| part.strip_prefix(mark));
-    refusal.is_some_and(|text| !OTHER_KINDS.iter().any(|kind| text.contains(kind)))
 }
 
 /// True for the extension, in lower case, of pictures in a format that is not read.
@@ -140,26 +149,32 @@ pub(super) fn reason_by_name(folder: &Path, file: &Path, extension: &str) -> Str
     }
 }
 
-/// The reason why a file that was tried as calibration or poses is left aside; `refusals` are the
-/// errors of both readers.
-pub(super) fn reason_of_text(folder: &Path, file: &Path, refusals: &[String]) -> String {
+/// The reason why a file that was tried as calibration or poses is left aside; `refusals` are those
+/// of both readers.
+pub(super) fn reason_of_text(folder: &Path, file: &Path, refusals: &[Refusal]) -> AsideReason {
     let path = folder.join(file);
     if read_tunnel_frame(&path).is_ok() {
         let name = slashed(file);
-        return format!("a frame of reference: tunnel_frame = \"{name}\" under [poses] takes it");
+        let text =
+            format!("a frame of reference: tunnel_frame = \"{name}\" under [poses] takes it");
+        return text.into();
     }
     if let Some(reason) = part_of_model(&path) {
-        return reason;
+        return reason.into();
     }
     let own = printed(&path).to_string();
-    let shortened = |text: &String| {
-        let text = text.replace(&format!("{own}: "), "");
+    let shortened = |refusal: &Refusal| {
+        let text = refusal.what.replace(&format!("{own}: "), "");
         let text = text.replace(&format!("{own}:"), "line ");
         let end = REMEDIES.iter().filter_map(|mark| text.find(mark)).min();
         text[..end.unwrap_or(text.len())].to_owned()
     };
-    let refusals: Vec<String> = refusals.iter().map(shortened).collect();
-    refusals.join("; ")
+    let texts: Vec<String> = refusals.iter().map(shortened).collect();
+    let faulty = refusals.iter().filter(|refusal| refusal.is_faulty);
+    AsideReason {
+        text: texts.join("; "),
+        faulty: faulty.map(|refusal| refusal.part).collect(),
+    }
 }
 
 /// The reason why a file of a COLMAP model is left aside, if it is one beside its cameras.
@@ -183,7 +198,7 @@ mod tests {
 
     #[test]
     fn files_of_one_kind_and_reason_are_one() {
-        let file = |path: &str, reason: &str| (PathBuf::from(path), reason.to_owned());
+        let file = |path: &str, reason: &str| (PathBuf::from(path), AsideReason::from(reason));
         let files = vec![
             file("d/2.npy", "a"),
             file("d/1.npy", "a"),

@@ -131,6 +131,7 @@ mod pose_validation;
 mod poses_section;
 mod readout;
 mod recorded_parts;
+mod refusal;
 mod rig_section;
 mod shape_file;
 mod skipped_frame;

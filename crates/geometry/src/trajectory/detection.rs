@@ -24,7 +24,7 @@ pub(super) fn detect_format(
     }
     let Some((number, line)) = text::lines(text).next() else {
         // Only comments.
-        return Err(PoseError::file(path, "holds no poses"));
+        return Err(PoseError::no_poses(path));
     };
     let order = options
         .quaternion
@@ -46,10 +46,10 @@ pub(super) fn detect_format(
         // A line of a wrong length is reported by the parser of the nearest format.
         (12, 12) | (kitti::WHOLE_MATRIX, kitti::WHOLE_MATRIX) => Ok(PoseFormat::Kitti),
         (most, all) if most >= 5 && all <= 9 => Ok(PoseFormat::Tum),
-        _ => Err(PoseError::line(
-            path,
-            number,
-            format!(
+        _ => Err(PoseError::OtherKind {
+            path: path.to_owned(),
+            line: Some(number),
+            what: format!(
                 "in no known format: neither of TUM (`{}`), \
                  KITTI (`{}`), CSV (`{}` named in the first line) nor a \
                  file of COLMAP, nerfstudio, EuRoC, OpenSfM, Bundler, Meshroom, OpenMVG, \
@@ -59,7 +59,7 @@ pub(super) fn detect_format(
                 kitti::FORM,
                 csv::FORM
             ),
-        )),
+        }),
     }
 }
 

@@ -25,6 +25,16 @@ pub enum PoseError {
         /// The problem and the remedy.
         what: String,
     },
+    /// The file is of another kind: in no known format, or without poses.
+    #[error("{}:{}{what}", printed(path), line_prefix(*line))]
+    OtherKind {
+        /// The file.
+        path: PathBuf,
+        /// 1-based number of the line that is in no known format.
+        line: Option<usize>,
+        /// The problem, and the formats that are known.
+        what: String,
+    },
     /// The file as a whole is invalid.
     #[error("{}: {what}", printed(path))]
     File {
@@ -45,6 +55,15 @@ impl PoseError {
         }
     }
 
+    /// The error of a file of a known format, or of a text without any line, that holds no poses.
+    pub(super) fn no_poses(path: &Path) -> Self {
+        Self::OtherKind {
+            path: path.to_owned(),
+            line: None,
+            what: "holds no poses".to_owned(),
+        }
+    }
+
     /// An error of the whole file.
     pub fn file(path: &Path, what: impl Into<String>) -> Self {
         Self::File {
@@ -52,4 +71,8 @@ impl PoseError {
             what: what.into(),
         }
     }
+}
+
+fn line_prefix(line: Option<usize>) -> String {
+    line.map_or(" ".to_owned(), |line| format!("{line}: "))
 }

@@ -101,7 +101,7 @@ pub fn read_poses_with(path: &Path, options: &PoseFileOptions) -> Result<PoseFil
     };
     let ParsedPoses { entries, conflicts } = parsed;
     if entries.is_empty() {
-        return Err(PoseError::file(&path, "holds no poses"));
+        return Err(PoseError::no_poses(&path));
     }
     if let Some(k) = entries.iter().position(|entry| !entry.pose.is_finite()) {
         let what = format!("pose {}: its numbers are too large", k + 1);

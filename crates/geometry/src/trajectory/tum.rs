@@ -33,7 +33,7 @@ pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
     let parsed = parse(path, &text::read(path)?, &PoseFileOptions::default())?;
     let entries = parsed.entries;
     if entries.is_empty() {
-        return Err(PoseError::file(path, "holds no poses"));
+        return Err(PoseError::no_poses(path));
     }
     let stamped = |entry: PoseEntry| StampedPose {
         time_s: entry.time_s.unwrap_or_default(),

@@ -14,7 +14,11 @@ type ReadLens = fn(&[f64]) -> Result<Lens, ParseError>;
 pub fn has_no_model(text: &str) -> bool {
     let has_name = |line: &str| {
         let second = line.split_whitespace().nth(1).unwrap_or_default();
-        second.starts_with(|first: char| first.is_ascii_alphabetic())
+        let mut letters = second.chars();
+        letters
+            .next()
+            .is_some_and(|first| first.is_ascii_uppercase())
+            && letters.all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_')
     };
     let mut lines = data_lines(text).peekable();
     lines.peek().is_some() && !lines.any(|(_, line)| has_name(line))

@@ -26,6 +26,14 @@ pub enum CalibrationError {
         /// The problem and the remedy.
         what: String,
     },
+    /// The file is of another kind: no calibration known here.
+    #[error("{}: {what}", printed(path))]
+    OtherKind {
+        /// The file.
+        path: PathBuf,
+        /// The kinds that are known.
+        what: String,
+    },
     /// The file holds several cameras, and none is selected.
     #[error("{}: {what}", printed(path))]
     Several {
@@ -47,8 +55,19 @@ fn line_prefix(line: Option<usize>) -> String {
 pub(super) struct ParseError {
     pub line: Option<usize>,
     pub what: String,
-    /// The names of the cameras, if one of several is to be selected.
-    pub names: Vec<String>,
+    pub kind: ParseErrorKind,
+}
+
+/// A kind of error of a parser.
+#[derive(Debug, Default, PartialEq)]
+pub(super) enum ParseErrorKind {
+    /// The content is invalid.
+    #[default]
+    Content,
+    /// The file is no calibration known here.
+    OtherKind,
+    /// One of several cameras, of these names, is to be selected.
+    Several(Vec<String>),
 }
 
 impl ParseError {

@@ -1,6 +1,6 @@
 //! Reading and validation of calibration files.
 
-use super::error::{CalibrationError, ParseError};
+use super::error::{CalibrationError, ParseError, ParseErrorKind};
 use super::picture_size::PictureSize;
 use super::unknown::unknown_calibration;
 use super::{
@@ -46,12 +46,12 @@ pub fn read_calibration_of(
     picture_size: PictureSize,
 ) -> Result<Camera, CalibrationError> {
     let content = |error: ParseError| {
-        let ParseError { line, what, names } = error;
+        let ParseError { line, what, kind } = error;
         let path = path.to_owned();
-        if names.is_empty() {
-            CalibrationError::Content { path, line, what }
-        } else {
-            CalibrationError::Several { path, names, what }
+        match kind {
+            ParseErrorKind::Content => CalibrationError::Content { path, line, what },
+            ParseErrorKind::OtherKind => CalibrationError::OtherKind { path, what },
+            ParseErrorKind::Several(names) => CalibrationError::Several { path, names, what },
         }
     };
     let unreadable = |source| CalibrationError::Read {
@@ -176,8 +176,7 @@ fn validate(camera: Camera) -> Result<Camera, ParseError> {
     if shown < MIN_VISIBLE_FRACTION {
         return Err(ParseError::new(format!(
             "the distortion folds the picture back on itself: only {:.0} % of it is shown; check \
-             its coefficients and their \
-             order, and that fx and fy are in pixels",
+             its coefficients and their order, and that fx and fy are in pixels",
             100.0 * shown
         )));
     }

@@ -1,6 +1,6 @@
 //! Selection of one camera of a file that holds several.
 
-use super::error::ParseError;
+use super::error::{ParseError, ParseErrorKind};
 
 /// Largest number of cameras that a message names.
 const MAX_NAMED: usize = 8;
@@ -34,7 +34,7 @@ pub fn select_camera<T: PartialEq>(
 fn several<T>(cameras: &[(String, T)]) -> ParseError {
     let names = cameras.iter().map(|(name, _)| name.clone()).collect();
     ParseError {
-        names,
+        kind: ParseErrorKind::Several(names),
         ..ParseError::new(format!(
             "the file holds several cameras ({}); select one with `name` under [camera] of \
              survey.toml",
@@ -71,7 +71,8 @@ mod tests {
         assert_eq!(select_camera(cameras(&[5, 5, 5]), None), Ok(5));
         assert_eq!(select_camera(cameras(&[5, 6, 5]), Some("2")), Ok(6));
         let error = select_camera(cameras(&[5, 6]), None).unwrap_err();
-        assert_eq!(error.names, ["1", "2"]);
+        let names = ["1", "2"].map(str::to_owned).to_vec();
+        assert_eq!(error.kind, ParseErrorKind::Several(names));
         let values: Vec<i32> = (0..232).collect();
         let said = select_camera(cameras(&values), None).unwrap_err().what;
         assert!(

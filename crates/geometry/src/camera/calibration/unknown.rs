@@ -1,6 +1,6 @@
 //! The answer to files that hold no calibration known here.
 
-use super::error::ParseError;
+use super::error::{ParseError, ParseErrorKind};
 
 /// The files that can be read.
 const KNOWN: &str = "known are camera.json and camera.toml of this program, YAML of OpenCV, ROS \
@@ -12,7 +12,9 @@ const KNOWN: &str = "known are camera.json and camera.toml of this program, YAML
 
 /// The error that names the known files; `missing`: an explanation in brackets, or nothing.
 pub fn unknown_calibration(missing: &str) -> ParseError {
-    ParseError::new(format!(
-        "this is not a calibration known here{missing}; {KNOWN}"
-    ))
+    let what = format!("this is not a calibration known here{missing}; {KNOWN}");
+    ParseError {
+        kind: ParseErrorKind::OtherKind,
+        ..ParseError::new(what)
+    }
 }
