@@ -24,6 +24,7 @@ mod gyro;
 mod habits;
 mod init;
 mod jobs;
+mod lens_slips;
 mod lenses;
 mod locate;
 mod masks;

@@ -1,9 +1,9 @@
 //! Readings of a survey's poses, pictures and camera that people get wrong, to be told by the
 //! pictures.
 
-use super::calibrate::CalibrationGroup;
 use super::error::SurveyError;
 use super::interpreted_poses::InterpretedPoses;
+use super::lens_readings::CameraReading;
 use super::open::Survey;
 use super::pose_reader::PoseReader;
 use super::pose_shift::shifted;
@@ -11,7 +11,6 @@ use super::pose_validation::feasible_conventions;
 use super::poses_section::PosesSection;
 use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
-use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{
     CameraAxes, Convention, Pose, PoseFormat, StampedPose, Trajectory,
@@ -23,9 +22,6 @@ const UNITS: [(&str, f64); 3] = [
     ("centimetres", 0.01),
     ("feet", 0.3048),
 ];
-
-/// Focal lengths over the given one that are tried: nearer ones are found by estimating them.
-const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
 
 /// Radii of a round tunnel over the given one that people confuse, and what they gave.
 const RADIUS_SLIPS: [(f64, &str); 4] = [
@@ -70,8 +66,8 @@ pub struct PoseReading {
     pub initial: Trajectory,
     /// The orientation of the pictures against the one given.
     pub orientation: PictureOrientation,
-    /// The focal length over the given one.
-    pub focal_factor: f64,
+    /// The camera against the one given.
+    pub camera: CameraReading,
     /// Places by which the poses belong to later frames than given; earlier if it is negative.
     pub shift_frames: isize,
     /// Factor of the errors of positions, at most 1: wider ones would excuse what the prior as
@@ -88,24 +84,15 @@ impl PoseReading {
             prior_nats: 0.0,
             initial,
             orientation: PictureOrientation::Stored,
-            focal_factor: 1.0,
+            camera: CameraReading::AsGiven,
             shift_frames: 0,
             error_scale: 1.0,
         }
     }
 
-    /// The camera of the reading, `given` the one of the survey.
-    pub fn camera(&self, given: &Camera) -> Camera {
-        Camera {
-            fx: self.focal_factor * given.fx,
-            fy: self.focal_factor * given.fy,
-            ..*given
-        }
-    }
-
-    /// True if the reading has another focal length than given.
-    pub fn changes_lens(&self) -> bool {
-        self.focal_factor != 1.0
+    /// True if the reading has another camera than given.
+    pub fn changes_camera(&self) -> bool {
+        self.camera != CameraReading::AsGiven
     }
 
     /// True if the reading has a pose of the file for frame `k`.
@@ -118,8 +105,8 @@ impl PoseReading {
 impl Survey {
     /// The initial poses as given, followed by every other reading that leaves all cameras inside:
     /// other conventions, the reverse order, quaternions that begin with w, other units, poses of
-    /// other frames, a diameter for the radius, pictures that are turned or mirrored, and other
-    /// focal lengths.
+    /// other frames, a diameter for the radius, pictures that are turned or mirrored, other
+    /// focal lengths and other lenses.
     ///
     /// # Errors
     /// The errors of [`Survey::open`], if the file has changed since.
@@ -159,11 +146,17 @@ impl Survey {
             orientation,
             ..as_given.clone()
         });
-        let lenses = self.other_focal_lengths(&as_given);
+        let cameras = self.camera_readings().into_iter();
+        let cameras = cameras.map(|(remedy, camera)| PoseReading {
+            remedy,
+            changes: 1,
+            camera,
+            ..as_given.clone()
+        });
         let others = poses
             .chain(self.other_radii(given.format))
             .chain(pictures)
-            .chain(lenses);
+            .chain(cameras);
         Ok(std::iter::once(as_given.clone()).chain(others).collect())
     }
 
@@ -171,25 +164,6 @@ impl Survey {
     fn has_turned_pictures(&self) -> bool {
         let mut readings = self.frames.iter().filter_map(|frame| frame.reading());
         readings.any(|reading| reading.orientation == PictureOrientation::Exif)
-    }
-
-    /// Readings of another focal length than given, beyond those that refining searches by itself.
-    fn other_focal_lengths(&self, as_given: &PoseReading) -> impl Iterator<Item = PoseReading> {
-        let section = self.file.calibrate.as_ref();
-        let searched =
-            section.filter(|section| section.unknowns.contains(&CalibrationGroup::Focal));
-        let reach = searched.map_or(0.0, |section| 0.02 * section.focal_sigma_percent);
-        let factors = FOCAL_FACTORS.into_iter();
-        let beyond = factors.filter(move |factor: &f64| factor.ln().abs() > reach);
-        beyond.map(|focal_factor| PoseReading {
-            remedy: format!(
-                "a focal length of about {focal_factor} times the given one (unknowns = \
-                 [\"focal\"] and focal_sigma_percent = 20 under [calibrate])"
-            ),
-            changes: 1,
-            focal_factor,
-            ..as_given.clone()
-        })
     }
 
     /// Readings of a straight round tunnel with another radius. Pictures of it are those of the

@@ -28,6 +28,7 @@ mod fov;
 mod kannala_brandt;
 mod lens;
 mod lens_error;
+mod lens_slip;
 #[cfg(test)]
 mod lens_tests;
 mod mei;
@@ -55,6 +56,7 @@ pub use fov::Fov;
 pub use kannala_brandt::KannalaBrandt;
 pub use lens::Lens;
 pub use lens_error::LensParameterError;
+pub use lens_slip::LensSlip;
 pub use mei::Mei;
 pub use ocam::{OCAM_COEFFICIENTS, Ocam};
 pub use projection::Camera;

@@ -27,7 +27,7 @@ impl Comparison {
     /// Evidence of each pair for a reading against the one given, nats, by priors alone, or by
     /// pixels, too, where a pair fits in both.
     ///
-    /// Only another focal length makes pairs correlate better or worse than as given. In all other
+    /// Only another camera makes pairs correlate better or worse than as given. In all other
     /// readings they differ by chance, which tells nothing.
     pub fn pair_nats(&self, reading: &[Option<Registered>], by_pixels: bool) -> Vec<f64> {
         let of_pixels = |(reading, given): (&Option<Registered>, &Option<Registered>)| {

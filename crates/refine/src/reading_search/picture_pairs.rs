@@ -144,7 +144,7 @@ impl<'s> PicturePairs<'s> {
     ) -> Result<Setup<'a>, RefineError> {
         let given = self.survey.prior;
         let input = RefineInput {
-            cameras: reading.camera(self.survey.cameras.of(0)).into(),
+            cameras: reading.camera.camera(self.survey.cameras.of(0)).into(),
             frames,
             initial,
             prior: Jitter {

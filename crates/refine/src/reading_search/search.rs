@@ -70,7 +70,7 @@ impl Found<'_> {
 /// A frame is registered on the wall that the one before it shows, as tracking does, from the
 /// reading's pose and within its prior. Where it is found in both readings, the evidence against
 /// the one given is by how much less the frame deviates from the prior, `½ eᵀΣ⁻¹e`, and, with
-/// another focal length, by how much better it correlates. A reading is taken if three
+/// another camera, by how much better it correlates. A reading is taken if three
 /// quarters of the pairs fit and speak for it, and its odds exceed the number of readings over the
 /// survey's rate of false alarms. There may be several: poses exactly as planned, seen from the
 /// tunnel's other end, are those of another convention.
@@ -197,7 +197,7 @@ fn compare<'r>(
         return Ok(None);
     }
     let registered = pictures.register(reading, |some| comparison.may_take(some))?;
-    let pair_nats = comparison.pair_nats(&registered, reading.changes_lens());
+    let pair_nats = comparison.pair_nats(&registered, reading.changes_camera());
     let log_odds = reading.prior_nats + pair_nats.iter().sum::<f64>();
     let is_taken = comparison.may_take(&registered) && log_odds > comparison.least_nats;
     Ok(is_taken.then(|| Found {
@@ -234,6 +234,7 @@ fn name(mut found: Vec<Found>) -> Option<FittingReadings> {
 mod tests {
     use super::*;
     use tunnelstitch_core::frames::PictureOrientation;
+    use tunnelstitch_core::survey::CameraReading;
 
     /// A usual reading, or one that is improbable from the beginning.
     fn reading(prior_nats: f64) -> PoseReading {
@@ -243,7 +244,7 @@ mod tests {
             prior_nats,
             initial: Vec::new(),
             orientation: PictureOrientation::Stored,
-            focal_factor: 1.0,
+            camera: CameraReading::AsGiven,
             shift_frames: 0,
             error_scale: 1.0,
         }

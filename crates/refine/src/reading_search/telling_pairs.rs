@@ -74,6 +74,7 @@ fn step(reading: &PoseReading, first: usize) -> Pose {
 mod tests {
     use super::*;
     use tunnelstitch_core::frames::PictureOrientation;
+    use tunnelstitch_core::survey::CameraReading;
     use tunnelstitch_geometry::trajectory::{JitterModel, StampedPose, spiral};
 
     const JITTER: Jitter = Jitter {
@@ -104,7 +105,7 @@ mod tests {
             initial: (0..=steps).map(stamped).collect(),
             orientation: PictureOrientation::Stored,
             shift_frames,
-            focal_factor: 1.0,
+            camera: CameraReading::AsGiven,
             error_scale: 1.0,
         }
     }
