@@ -5,7 +5,8 @@ use crate::cli::output::{Failure, Terminal};
 use crate::report::REFINEMENT_FILE;
 use crate::survey::{Associate, PosesSection, SURVEY_FILE, Survey, SurveyError, SurveyFile};
 use crate::trajectory::{
-    CameraAxes, Direction, PoseColumn, PoseFormat, QuaternionOrder, Trajectory,
+    AngleUnit, CameraAxes, Direction, EulerSequence, PoseColumn, PoseFormat, QuaternionOrder,
+    Trajectory,
 };
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ pub struct PoseReadingArguments {
     #[arg(long, value_enum, value_name = "FORMAT")]
     pose_format: Option<FormatArgument>,
     /// Names of columns in the header of a CSV file, for columns whose names are not known:
-    /// COLUMN is frame, time_s, time_ns, tx, ty, tz, qx, qy, qz or qw.
+    /// COLUMN is frame, time_s, time_ns, tx, ty, tz, qx, qy, qz, qw, or rx, ry, rz for angles.
     #[arg(
         long,
         value_name = "COLUMN=NAME",
@@ -26,6 +27,13 @@ pub struct PoseReadingArguments {
         value_parser = parse_column
     )]
     pose_columns: Vec<(PoseColumn, String)>,
+    /// Order of rotations in a CSV file with angles about axes (roll, pitch, yaw): ZYX for R =
+    /// Rz(yaw) Ry(pitch) Rx(roll), XYZ for omega, phi, kappa; small letters for fixed axes.
+    #[arg(long, value_name = "ORDER")]
+    pose_euler: Option<EulerSequence>,
+    /// Unit of these angles: deg or rad [default: as the header tells].
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pose_angle_unit: Option<AngleUnitArgument>,
     /// Order of the quaternion in TUM files: xyzw or wxyz [default: as a comment before the poses
     /// names it, or xyzw].
     #[arg(long, value_enum, value_name = "ORDER")]
@@ -118,6 +126,24 @@ enum QuaternionArgument {
     Xyzw,
     /// qw qx qy qz.
     Wxyz,
+}
+
+/// Names of units of angles.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum AngleUnitArgument {
+    /// Degrees.
+    Deg,
+    /// Radians.
+    Rad,
+}
+
+impl From<AngleUnitArgument> for AngleUnit {
+    fn from(unit: AngleUnitArgument) -> Self {
+        match unit {
+            AngleUnitArgument::Deg => Self::Deg,
+            AngleUnitArgument::Rad => Self::Rad,
+        }
+    }
 }
 
 /// Names of directions.
@@ -261,6 +287,8 @@ impl PoseReadingArguments {
         replace(&mut poses.format, self.pose_format.map(Into::into));
         poses.columns.extend(self.pose_columns.iter().cloned());
         replace(&mut poses.topic, self.pose_topic.clone());
+        replace(&mut poses.euler, self.pose_euler);
+        replace(&mut poses.angle_unit, self.pose_angle_unit.map(Into::into));
         replace(&mut poses.quaternion, self.pose_quaternion.map(Into::into));
         replace(&mut poses.convention, self.pose_convention.map(Into::into));
         replace(&mut poses.camera_axes, self.camera_axes.map(Into::into));

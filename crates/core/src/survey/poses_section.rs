@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use tunnelstitch_geometry::recordings::{PoseTopic, is_recording};
 use tunnelstitch_geometry::trajectory::{
-    CameraAxes, ColumnMap, Direction, DuplicateTimes, PoseFileOptions, PoseFormat, QuaternionOrder,
-    TimeUnit,
+    AngleUnit, CameraAxes, ColumnMap, Direction, DuplicateTimes, EulerSequence, PoseFileOptions,
+    PoseFormat, QuaternionOrder, TimeUnit,
 };
 
 /// `[poses]`. Defaults are detected from the files' content or given by the conventions of their
@@ -36,6 +36,12 @@ pub struct PosesSection {
     /// Names of columns in the headers of CSV files, for columns whose names are not known.
     #[serde(default, skip_serializing_if = "ColumnMap::is_empty")]
     pub columns: ColumnMap,
+    /// The order of rotations in CSV files with angles about axes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub euler: Option<EulerSequence>,
+    /// The unit of angles in CSV files whose header does not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle_unit: Option<AngleUnit>,
     /// The order of the quaternion's numbers in TUM files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quaternion: Option<QuaternionOrder>,
@@ -125,6 +131,8 @@ impl PosesSection {
         PoseFileOptions {
             format: self.format,
             columns: self.columns.clone(),
+            euler: self.euler,
+            angle_unit: self.angle_unit,
             quaternion: self.quaternion,
             time_unit: self.time_unit,
             recorded: PoseTopic {

@@ -2,6 +2,7 @@
 
 use super::csv::ColumnMap;
 use super::entry_list::DuplicateTimes;
+use super::euler::{AngleUnit, EulerSequence};
 use super::format::PoseFormat;
 use super::quaternion_order::QuaternionOrder;
 use super::time_unit::TimeUnit;
@@ -14,6 +15,10 @@ pub struct PoseFileOptions {
     pub format: Option<PoseFormat>,
     /// CSV: names of columns in the file's header, for columns whose names are not known.
     pub columns: ColumnMap,
+    /// CSV: the order of rotations, if these are angles about axes instead of a quaternion.
+    pub euler: Option<EulerSequence>,
+    /// CSV: the unit of angles whose columns do not tell.
+    pub angle_unit: Option<AngleUnit>,
     /// TUM: the order of the quaternion's numbers; by default the one that a comment names, or
     /// TUM's own.
     pub quaternion: Option<QuaternionOrder>,

@@ -2,6 +2,8 @@
 
 use super::pose_column::{ColumnMap, PoseColumn};
 use super::title::Title;
+use crate::trajectory::euler::{AngleUnit, EulerSequence};
+use crate::trajectory::pose_options::PoseFileOptions;
 use crate::trajectory::time_unit::TimeUnit;
 use csv::StringRecord;
 
@@ -14,8 +16,18 @@ pub(super) struct Columns {
     pub name: Option<usize>,
     /// The column of times, or its two.
     pub time: Option<TimeColumn>,
-    /// The columns `tx`, `ty`, `tz`, `qx`, `qy`, `qz`, `qw`.
-    pub pose: [usize; 7],
+    /// The columns `tx`, `ty`, `tz`.
+    pub translation: [usize; 3],
+    /// The columns of the rotation.
+    pub rotation: RotationColumns,
+}
+
+/// Indices of the columns of a rotation.
+pub(super) enum RotationColumns {
+    /// `qx`, `qy`, `qz`, `qw`.
+    Quaternion([usize; 4]),
+    /// Angles about x, y and z with their units.
+    Angles([(usize, AngleUnit); 3], EulerSequence),
 }
 
 /// Indices of the columns of a time.
@@ -30,24 +42,22 @@ pub(super) enum TimeColumn {
 }
 
 impl Columns {
-    /// Finds the columns of a header by the names that `map` gives them, or else by known ones.
+    /// Finds the columns of a header by the names that options give them, or else by known ones.
     ///
     /// # Errors
-    /// A column of poses that is missing, or one that two columns could be.
-    pub fn of(header: &StringRecord, map: &ColumnMap) -> Result<Self, String> {
+    /// A column of poses that is missing, or one that two columns could be; angles whose order or
+    /// unit is not known.
+    pub fn of(header: &StringRecord, options: &PoseFileOptions) -> Result<Self, String> {
         let titles = Titles {
             header,
             titles: header.iter().map(Title::of).collect(),
-            map,
+            map: &options.columns,
         };
-        let mut pose = [0; 7];
-        for (index, column) in pose.iter_mut().zip(PoseColumn::POSE) {
-            *index = titles.find(column)?.ok_or_else(|| titles.missing(column))?;
-        }
         Ok(Self {
             name: titles.find(PoseColumn::Frame)?,
             time: titles.find_time()?,
-            pose,
+            translation: titles.need(PoseColumn::TRANSLATION)?,
+            rotation: titles.find_rotation(options)?,
         })
     }
 }
@@ -110,6 +120,68 @@ impl Titles<'_> {
         }
     }
 
+    /// The indices of columns that must be there.
+    fn need<const N: usize>(&self, columns: [PoseColumn; N]) -> Result<[usize; N], String> {
+        let mut indices = [0; N];
+        for (index, column) in indices.iter_mut().zip(columns) {
+            *index = self.find(column)?.ok_or_else(|| self.missing(column))?;
+        }
+        Ok(indices)
+    }
+
+    /// The columns of a quaternion, or of angles whose order of rotations is given.
+    fn find_rotation(&self, options: &PoseFileOptions) -> Result<RotationColumns, String> {
+        let has_column = |column| Ok::<_, String>(self.find(column)?.is_some());
+        let Some(sequence) = options.euler else {
+            let has_angle = has_column(PoseColumn::Rx)? && has_column(PoseColumn::Ry)?;
+            if has_angle && !has_column(PoseColumn::Qx)? && !has_column(PoseColumn::Qw)? {
+                return Err(self.unknown_order(options.angle_unit));
+            }
+            return self
+                .need(PoseColumn::QUATERNION)
+                .map(RotationColumns::Quaternion);
+        };
+        let mut angles = [(0, AngleUnit::Deg); 3];
+        let columns = self.need(PoseColumn::ANGLES)?;
+        for (angle, index) in angles.iter_mut().zip(columns) {
+            let unit = options.angle_unit.or(self.titles[index].angle_unit());
+            let name = self.header.get(index).unwrap_or_default();
+            let unit = unit.ok_or_else(|| {
+                format!("the unit of `{name}` is not known; say which one with {ANGLE_UNIT}")
+            })?;
+            *angle = (index, unit);
+        }
+        Ok(RotationColumns::Angles(angles, sequence))
+    }
+
+    /// The error of angles whose order of rotations is not given.
+    fn unknown_order(&self, unit: Option<AngleUnit>) -> String {
+        let (sequence, axes, other) = if self.titles.iter().any(Title::is_omega) {
+            (
+                "XYZ",
+                " and camera_axes = \"opengl\"",
+                "if they are the angles R = Rx(omega) Ry(phi) Rz(kappa) of photogrammetry",
+            )
+        } else {
+            (
+                "ZYX",
+                "",
+                "if R = Rz(yaw) Ry(pitch) Rx(roll), as robots and vehicles have it",
+            )
+        };
+        let has_unit = unit.is_some() || self.titles.iter().any(|t| t.angle_unit().is_some());
+        let unit = if has_unit {
+            ""
+        } else {
+            " and angle_unit = \"deg\" (or \"rad\")"
+        };
+        format!(
+            "programs differ in the order of angles: write euler = \"{sequence}\"{unit}{axes} in \
+             [poses] of survey.toml (--pose-euler …) {other}; the columns are {}",
+            self.listed()
+        )
+    }
+
     fn find_time(&self) -> Result<Option<TimeColumn>, String> {
         let position = |is: fn(&Title) -> bool| self.titles.iter().position(is);
         if let Some(index) = self.find(PoseColumn::TimeS)? {
@@ -138,21 +210,24 @@ impl Titles<'_> {
 
     fn missing(&self, column: PoseColumn) -> String {
         let name = column.name();
-        let is_rotation = matches!(name.as_bytes(), [b'q', _]);
-        let known = match is_rotation {
-            true => format!("`{name}`"),
-            false => format!("`{name}_m` or `{name}`"),
-        };
-        let remedy = if is_rotation && self.titles.iter().any(Title::is_angle) {
-            "angles are not read, since programs differ in their order and axes; write the \
-             rotation as a quaternion qx, qy, qz, qw (Rotation.from_euler of SciPy makes it)"
-                .to_owned()
+        let known = if PoseColumn::TRANSLATION.contains(&column) {
+            format!("`{name}_m` or `{name}`")
         } else {
-            format!("if it has another name, say so with {}", remedy(column))
+            format!("`{name}`")
         };
+        if PoseColumn::TRANSLATION.contains(&column) && self.titles.iter().any(Title::is_geographic)
+        {
+            return format!(
+                "no column {known}; the columns are {}; latitude and longitude are no metres: \
+                 project them first, as `cs2cs EPSG:4326 EPSG:…` of PROJ does, and name the \
+                 columns of the result tx, ty, tz",
+                self.listed()
+            );
+        }
         format!(
-            "no column {known}; the columns are {}; {remedy}",
-            self.listed()
+            "no column {known}; the columns are {}; if it has another name, say so with {}",
+            self.listed(),
+            remedy(column)
         )
     }
 
@@ -162,6 +237,10 @@ impl Titles<'_> {
         format!("`{}`", names.join("`, `"))
     }
 }
+
+/// The key and the flag that name the unit of angles.
+const ANGLE_UNIT: &str =
+    "angle_unit = \"deg\" or \"rad\" in [poses] of survey.toml (--pose-angle-unit deg)";
 
 /// The key and the flag that name a column.
 fn remedy(column: PoseColumn) -> String {

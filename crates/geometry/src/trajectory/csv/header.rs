@@ -70,7 +70,7 @@ fn is_header(line: &str, separator: u8, map: &ColumnMap) -> bool {
     };
     let is_pose = |text: &&str| {
         let title = Title::of(text);
-        let mut pose = PoseColumn::POSE.into_iter();
+        let mut pose = (PoseColumn::TRANSLATION.into_iter()).chain(PoseColumn::QUATERNION);
         map.values().any(|name| name == text) || pose.any(|column| title.rank(column).is_some())
     };
     record.iter().filter(is_pose).count() >= MIN_POSE_COLUMNS

@@ -32,6 +32,12 @@ pub enum PoseColumn {
     Qz,
     /// The quaternion's w.
     Qw,
+    /// Angle about x: roll, ω.
+    Rx,
+    /// Angle about y: pitch, φ.
+    Ry,
+    /// Angle about z: yaw, heading, κ.
+    Rz,
 }
 
 /// Names of columns in the header of a file, for columns whose names are not known.
@@ -39,7 +45,7 @@ pub type ColumnMap = BTreeMap<PoseColumn, String>;
 
 impl PoseColumn {
     /// All columns.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 15] = [
         Self::Frame,
         Self::TimeS,
         Self::TimeMs,
@@ -52,12 +58,16 @@ impl PoseColumn {
         Self::Qy,
         Self::Qz,
         Self::Qw,
+        Self::Rx,
+        Self::Ry,
+        Self::Rz,
     ];
-    /// The columns that every table needs.
-    pub(super) const POSE: [Self; 7] = {
-        let [_frame, _s, _ms, _us, _ns, pose @ ..] = Self::ALL;
-        pose
-    };
+    /// The columns of a translation.
+    pub(super) const TRANSLATION: [Self; 3] = [Self::Tx, Self::Ty, Self::Tz];
+    /// The columns of a quaternion.
+    pub(super) const QUATERNION: [Self; 4] = [Self::Qx, Self::Qy, Self::Qz, Self::Qw];
+    /// The columns of angles about x, y and z.
+    pub(super) const ANGLES: [Self; 3] = [Self::Rx, Self::Ry, Self::Rz];
 
     /// The name in survey.toml and in flags.
     pub fn name(self) -> &'static str {
@@ -74,6 +84,9 @@ impl PoseColumn {
             Self::Qy => "qy",
             Self::Qz => "qz",
             Self::Qw => "qw",
+            Self::Rx => "rx",
+            Self::Ry => "ry",
+            Self::Rz => "rz",
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Reading of CSV files of poses.
 
 use super::cells::name_from_cell;
-use super::columns::{Columns, FORM, TimeColumn};
+use super::columns::{Columns, FORM, RotationColumns, TimeColumn};
 use super::header::Header;
 use super::table::split;
 use crate::trajectory::entry_list::{EntryList, ParsedPoses};
@@ -29,7 +29,7 @@ pub(crate) fn parse(
     let fail = |number: usize| move |what: String| PoseError::line(path, number, what);
     let titles = split(header.line, header.separator).map_err(fail(header.number))?;
     let row = RowReader {
-        columns: Columns::of(&titles, map).map_err(fail(header.number))?,
+        columns: Columns::of(&titles, options).map_err(fail(header.number))?,
         count: titles.len(),
         separator: header.separator,
         time_unit: options.time_unit,
@@ -76,11 +76,22 @@ impl RowReader {
                 self.count
             ));
         }
-        let mut values = [0.0; 7];
-        for (value, column) in values.iter_mut().zip(self.columns.pose) {
-            *value = text::number(&self.number_in(&record, column), FORM)?;
-        }
-        let [tx, ty, tz, qx, qy, qz, qw] = values;
+        let number = |column| text::number(&self.number_in(&record, column), FORM);
+        let [tx, ty, tz] = self.columns.translation;
+        let position = Vector3::new(number(tx)?, number(ty)?, number(tz)?);
+        let rotation = match self.columns.rotation {
+            RotationColumns::Quaternion([qx, qy, qz, qw]) => {
+                let wxyz = [number(qw)?, number(qx)?, number(qy)?, number(qz)?];
+                text::rotation(wxyz, "as the columns' names say")?
+            }
+            RotationColumns::Angles(columns, sequence) => {
+                let mut angles_rad = [0.0; 3];
+                for (angle, (column, unit)) in angles_rad.iter_mut().zip(columns) {
+                    *angle = unit.radians(number(column)?);
+                }
+                sequence.rotation(angles_rad)
+            }
+        };
         let name = self
             .columns
             .name
@@ -92,10 +103,7 @@ impl RowReader {
             camera: None,
             name: name.map(|name| name_from_cell(name).to_owned()),
             time_s: self.time(&record)?,
-            pose: Pose::new(
-                text::rotation([qw, qx, qy, qz], "as the columns' names say")?,
-                Vector3::new(tx, ty, tz),
-            ),
+            pose: Pose::new(rotation, position),
         })
     }
 
@@ -126,6 +134,7 @@ impl RowReader {
 mod tests {
     use super::*;
     use crate::trajectory::csv::format;
+    use crate::trajectory::euler::AngleUnit;
     use crate::trajectory::stamped_pose::StampedPose;
 
     fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
@@ -164,19 +173,58 @@ mod tests {
         assert_eq!(read, names);
     }
 
-    /// Angles cannot be read, and decimal commas between commas not either.
+    /// Angles without their order and unit, and decimal commas between commas.
     #[test]
     fn what_a_table_lacks_is_named_with_what_helps() {
         let error = |text: &str| parse(Path::new("p.csv"), text).unwrap_err().to_string();
         let said = error("tx,ty,tz,roll,pitch,yaw\n0,0,0,0,0,0\n");
-        assert!(said.starts_with("p.csv:1: no column `qx`"), "{said}");
+        let lines = "euler = \"ZYX\" and angle_unit = \"deg\" (or \"rad\") in [poses]";
         assert!(
-            said.contains("a quaternion") && !said.contains("--pose-columns"),
+            said.starts_with("p.csv:1: ") && said.contains(lines),
             "{said}"
         );
+        let said = error("x,y,z,omega_deg,phi_deg,kappa_deg\n0,0,0,0,0,0\n");
+        let lines = "euler = \"XYZ\" and camera_axes = \"opengl\" in [poses]";
+        assert!(said.contains(lines), "{said}");
+        let said = error("name,Latitude,longitude,alt,qx,qy,qz,qw\n");
+        assert!(said.contains("no metres: project them"), "{said}");
         let said = error("tx,ty,tz,qx,qy,qz,qw\n0,5,0,5,0,5,0,5,0,5,0,5,0,5\n");
         assert!(
             said.contains(":2: 14 columns") && said.contains("semicolons"),
+            "{said}"
+        );
+    }
+
+    /// Angles in degrees and radians, told by the header or by the options.
+    #[test]
+    fn angles_are_read_in_the_order_that_is_given() {
+        let read = |text: &str, euler: &str, angle_unit| {
+            let options = PoseFileOptions {
+                euler: Some(euler.parse().unwrap()),
+                angle_unit,
+                ..PoseFileOptions::default()
+            };
+            super::parse(Path::new("p.csv"), text, &options).map(|parsed| parsed.entries[0].pose)
+        };
+        let degrees = "tx,ty,tz,roll_deg,pitch [deg],Yaw (°)\n1,2,3,10,20,30\n";
+        let pose = read(degrees, "ZYX", None).unwrap();
+        let [roll, pitch, yaw] = [10.0f64, 20.0, 30.0].map(f64::to_radians);
+        let expected = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+        assert!(pose.r_wc.angle_to(&expected) < 1e-12);
+        assert_eq!(pose.t_wc, Vector3::new(1.0, 2.0, 3.0));
+        let radians = format!("yaw,pitch,roll,x,y,z\n{yaw},{pitch},{roll},1,2,3\n");
+        let same = read(&radians, "xyz", Some(AngleUnit::Rad)).unwrap();
+        assert!(same.r_wc.angle_to(&expected) < 1e-12);
+        let said = read(&radians, "ZYX", None).unwrap_err().to_string();
+        assert!(
+            said.contains("unit of `roll`") && said.contains("angle_unit"),
+            "{said}"
+        );
+        let said = read("x,y,z,roll,yaw\n", "ZYX", None)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            said.contains("no column `ry`") && said.contains("columns = { ry"),
             "{said}"
         );
     }

@@ -1,6 +1,7 @@
 //! Names that this program, ROS and EuRoC give to the columns of poses.
 
 use super::pose_column::PoseColumn;
+use crate::trajectory::euler::AngleUnit;
 use crate::trajectory::time_unit::TimeUnit;
 
 const FRAME: &[&str] = &[
@@ -11,6 +12,8 @@ const FRAME: &[&str] = &[
     "file_name",
     "image",
     "image_name",
+    "imagename",
+    "photo",
 ];
 /// Names of times, best first: the stamp of a message of ROS is the camera's, its `%time` may be
 /// that of the recording.
@@ -23,9 +26,11 @@ const TIMES: [&[&str]; 3] = [
 /// `pose.pose.position.x`.
 const TRANSLATIONS: &[&str] = &["position", "translation", "pos"];
 const ROTATIONS: &[&str] = &["orientation", "rotation", "quaternion", "quat"];
-/// Names of angles about an axis.
-const ANGLES: &[&str] = &[
-    "roll", "pitch", "yaw", "heading", "omega", "phi", "kappa", "rx", "ry", "rz",
+/// Names of angles about x, y and z.
+const ANGLES: [&[&str]; 3] = [
+    &["roll", "omega", "rx"],
+    &["pitch", "phi", "ry"],
+    &["yaw", "heading", "kappa", "rz"],
 ];
 
 /// The title of a column: its name in lower case, with `_` for other separators of words, and its
@@ -73,6 +78,9 @@ impl Title {
             PoseColumn::Qy => self.rank_of_rotation("y"),
             PoseColumn::Qz => self.rank_of_rotation("z"),
             PoseColumn::Qw => self.rank_of_rotation("w"),
+            PoseColumn::Rx => self.rank_of_angle(0),
+            PoseColumn::Ry => self.rank_of_angle(1),
+            PoseColumn::Rz => self.rank_of_angle(2),
         }
     }
 
@@ -88,9 +96,27 @@ impl Title {
             .any(|end| self.name.ends_with(end))
     }
 
-    /// True for an angle about an axis, such as `roll_deg` or `pose.yaw`.
-    pub fn is_angle(&self) -> bool {
-        self.name.split('_').any(|word| ANGLES.contains(&word))
+    /// The unit of an angle, which brackets or the last word of the name tell.
+    pub fn angle_unit(&self) -> Option<AngleUnit> {
+        let last = self.name.rsplit('_').next().unwrap_or_default();
+        let word = if self.unit.is_empty() {
+            last
+        } else {
+            self.unit.as_str()
+        };
+        let mut units = AngleUnit::ALL.into_iter();
+        units.find(|unit| unit.is_called(word))
+    }
+
+    /// True for a coordinate on the globe.
+    pub fn is_geographic(&self) -> bool {
+        let mut words = self.name.split('_');
+        words.any(|word| ["lat", "latitude", "lon", "lng", "longitude"].contains(&word))
+    }
+
+    /// True for an angle of photogrammetry.
+    pub fn is_omega(&self) -> bool {
+        self.name.split('_').any(|word| word == "omega")
     }
 
     /// The rank of a time in a unit that brackets or the last word of the name tell; `stamp_secs`
@@ -127,6 +153,14 @@ impl Title {
         self.is_axis_of(axis, 'q', ROTATIONS).then_some(1)
     }
 
+    /// The rank of an angle about an axis, such as `roll_deg` or `pose.yaw [rad]`.
+    fn rank_of_angle(&self, axis: usize) -> Option<usize> {
+        let has_unit = self.unit.is_empty() || self.angle_unit().is_some();
+        let is_so_called = |word: &str| has_unit && ANGLES[axis].contains(&word);
+        let mut words = self.name.split('_');
+        words.any(is_so_called).then_some(0)
+    }
+
     /// True for names like `pose_position_x`, whose last word but one is one of `words`, and for
     /// names like EuRoC's `p_rs_r_x`, whose first word is `letter`.
     fn is_axis_of(&self, axis: &str, letter: char, words: &[&str]) -> bool {
@@ -150,11 +184,25 @@ mod tests {
 
     #[test]
     fn angles_are_told_from_other_columns() {
-        for text in ["roll", "Yaw [deg]", "pose.pitch", "omega_rad", "rx"] {
-            assert!(Title::of(text).is_angle(), "{text}");
+        use PoseColumn::{Rx, Ry, Rz};
+        let (degrees, radians) = (Some(AngleUnit::Deg), Some(AngleUnit::Rad));
+        for (text, column, unit) in [
+            ("roll", Rx, None),
+            ("Yaw [deg]", Rz, degrees),
+            ("pose.pitch", Ry, None),
+            ("omega_rad", Rx, radians),
+            ("Phi (°)", Ry, degrees),
+            ("heading_degrees", Rz, degrees),
+            ("rx", Rx, None),
+        ] {
+            let title = Title::of(text);
+            assert_eq!(title.rank(column), Some(0), "{text}");
+            assert_eq!(title.angle_unit(), unit, "{text}");
         }
-        for text in ["qx", "x", "time", "rolled"] {
-            assert!(!Title::of(text).is_angle(), "{text}");
+        for text in ["qx", "x", "time", "rolled", "roll [m]"] {
+            let title = Title::of(text);
+            let ranks = PoseColumn::ANGLES.map(|column| title.rank(column));
+            assert_eq!(ranks, [None; 3], "{text}");
         }
     }
 
