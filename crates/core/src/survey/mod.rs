@@ -115,6 +115,7 @@ mod joined_folders;
 mod keyframe_selection;
 mod left_aside;
 mod lens_readings;
+mod lost_poses;
 mod masked_wall;
 mod matrix_folders;
 mod missing_poses;

@@ -9,6 +9,7 @@
 
 use super::error::SurveyError;
 use super::interpreted_poses::InterpretedPoses;
+use super::lost_poses::LostPoses;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
 use tunnelstitch_geometry::camera::Camera;
@@ -373,6 +374,7 @@ pub(super) fn validate_poses(
     path: &Path,
 ) -> Result<Vec<String>, SurveyError> {
     let stand = PoseSummary::of(surface, camera, poses);
+    let lost = LostPoses::find(reading);
     let remedy = || remedy(surface, camera, reading);
     let outside = poses.iter().enumerate().find_map(|(frame, pose)| {
         surface
@@ -387,6 +389,9 @@ pub(super) fn validate_poses(
             frame,
             source,
             remedy: match other {
+                _ if lost.iter().any(|lost| lost.contains(frame)) => {
+                    LostPoses::sentence(&lost, path).unwrap_or_default()
+                }
                 Some(other) => format!(
                     "{} of {} cameras are; they would all be inside and look at the wall with \
                      {other}",
@@ -402,6 +407,7 @@ pub(super) fn validate_poses(
         });
     }
     check_gaps(surface, poses, path)?;
+    let mut warnings: Vec<String> = LostPoses::sentence(&lost, path).into_iter().collect();
     if stand.is_wrong()
         && let Some(other) = remedy()
     {
@@ -418,13 +424,13 @@ pub(super) fn validate_poses(
         let likely = remedy().map_or(String::new(), |other| {
             format!("; they would go along it with {other}")
         });
-        return Ok(vec![format!(
+        warnings.push(format!(
             "{}: the cameras move or turn across the tunnel, not along its axis (the world's \
              y){likely}",
             printed(path)
-        )]);
+        ));
     }
-    Ok(Vec::new())
+    Ok(warnings)
 }
 
 /// True if the file has no pose of a frame.

@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(is_faulty("c.json", "{\"a\": 1}"), other);
         let short = "0 0 0 0 0 0 0 1\n1 0 0 0.1 0 0 0\n";
         assert_eq!(is_faulty("d.txt", short), [Some(false), Some(true)]);
-        let camera = "1 PINHOL 64 48 50 50 32\n";
+        let camera = "1 OPENCVX 64 48 50 50 32 24 0 0 0\n";
         assert_eq!(is_faulty("e.txt", camera), [Some(true), Some(false)]);
     }
 

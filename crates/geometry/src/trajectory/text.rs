@@ -122,7 +122,8 @@ pub fn rotation([w, x, y, z]: [f64; 4], order: &str) -> Result<UnitQuaternion<f6
     let norm = quaternion.norm();
     if norm < 1e-6 {
         return Err(
-            "the quaternion is zero; no rotation at all is qw = 1, qx = qy = qz = 0".into(),
+            "the quaternion is zero, as some trackers write where they have lost the camera; leave \
+             the line out of a file that names its frames, or leave out the frame, too".into(),
         );
     }
     if (norm - 1.0).abs() > 0.01 {
