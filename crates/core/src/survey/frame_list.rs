@@ -87,6 +87,20 @@ fn check_video(section: &FramesSection) -> Result<usize, &'static str> {
     interval(section)
 }
 
+/// Refuses a single file with several pages.
+fn check_pages(listed: &[FrameFile]) -> Result<(), SurveyError> {
+    let [only] = listed else {
+        return Ok(());
+    };
+    match frames::count_pages(only.file()) {
+        0 | 1 => Ok(()),
+        pages => Err(SurveyError::Pages {
+            path: only.file().to_owned(),
+            pages,
+        }),
+    }
+}
+
 impl FrameList {
     /// Finds the frames that the section of the survey at `toml_path` names, relative to its
     /// `folder`. `frame_times`: a file of their times, instead of the survey's. A mask in the same
@@ -118,6 +132,7 @@ impl FrameList {
                 let fetched = stored.map(|url| Mirror::of_user().fetch_pattern(&url));
                 let pattern = fetched.unwrap_or_else(|| Ok(pattern.clone()))?;
                 let listed = frames::list_frames(folder, &pattern, mask.as_deref())?;
+                check_pages(&listed)?;
                 Self::of_images(listed, reading)
             }
             (None, Some(video), None) => {
