@@ -256,6 +256,8 @@ seed points xyz 2 <<<$'x y z\n1 2 3\n4 5 6'
 } >"$work/las"
 seed points las 3 <"$work/las"
 seed points laz 4 <"$work/las"
+seed frame_pixels pixels <<<$'frame,u,v,note\n0,16,12,crack\n000001.png,1.5,2.5,"a, b"'
+printf '1 0 0 0\n0 1 0 0.1\n0 0 1 0\n0 0 0 1\n\0000 -1 0 1 1 0 0 2.5 0 0 1 -3\n' | seed matrix_folders two
 seed frame_times times <<<$'0\n1\n2\n3'
 seed frame_times names <<<$'0.5 000000.png\n1 000001.png\n2 000002.png\n3000000000000000 000003.png'
 seed plan frames <<<$'frame,chainage_m,angle_deg,x_m,z_m\n0,0,350,0,0\n4,1,370,0.1,0'

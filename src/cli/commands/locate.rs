@@ -2,7 +2,7 @@
 //! by [`locate_points`].
 
 use crate::cli::arguments::{CanvasArguments, PosesArguments, input_file};
-use crate::cli::commands::locate_points::{find_frame, locate_points};
+use crate::cli::commands::locate_points::locate_points;
 use crate::cli::output::{Failure, Terminal, json};
 use crate::render::{
     Canvas, FramePixelError, LaidOut, Layout, Placement, Sighting, hit_of_pixel, lay_out, sightings,
@@ -266,7 +266,8 @@ fn wall_point(
     let Some(FramePixel { frame, pixel }) = &arguments.frame else {
         return Err(Failure::bug("no point is given"));
     };
-    let k = find_frame(survey, frame)
+    let k = survey
+        .find_frame(frame)
         .map_err(|what| Failure::usage(format!("--frame {frame}: {what}")))?;
     hit_of_pixel(
         survey.surface.as_ref(),

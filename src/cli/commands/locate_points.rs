@@ -2,17 +2,14 @@
 //! writes.
 
 use crate::cli::output::{Failure, Terminal, is_stream, json, refuse_two_results};
-use crate::files::{open_regular, printed};
+use crate::files::printed;
 use crate::persist::atomic;
 use crate::render::{hit_of_pixel, place_frames};
-use crate::survey::Survey;
+use crate::survey::{FramePixel, FramePixels, Survey};
 use crate::trajectory::Pose;
-use csv::StringRecord;
 use serde::Serialize;
 use std::path::Path;
 
-/// Columns of the input.
-const COLUMNS: [&str; 3] = ["frame", "u", "v"];
 /// Columns that the output has behind those of the input.
 const ADDED_COLUMNS: [&str; 3] = ["theta_rad", "h_m", "range_m"];
 
@@ -34,26 +31,20 @@ pub fn locate_points(
     let placements = place_frames(surface, &survey.cameras, poses, &survey.shutter())?;
     refuse_two_results(out, terminal)?;
     let bad = |what: String| Failure::input(format!("{}: {what}", printed(points)));
-    let source = open_regular(points).map_err(|error| bad(error.to_string()))?;
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_reader(source);
-    let headers = reader
-        .headers()
-        .map_err(|error| bad(error.to_string()))?
-        .clone();
-    let columns = find_columns(&headers).map_err(bad)?;
+    let rows = FramePixels::open(survey, points).map_err(bad)?;
+    let headers = rows.headers().clone();
     let mut writer = csv::Writer::from_writer(Vec::new());
     let written = |error: csv::Error| Failure::bug(error.to_string());
     writer
         .write_record(headers.iter().chain(ADDED_COLUMNS))
         .map_err(written)?;
     let (mut count, mut found) = (0, 0);
-    for record in reader.records() {
-        let record = record.map_err(|error| bad(error.to_string()))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let at_line = |what: String| bad(format!("line {line}: {what}"));
-        let (frame, pixel) = parse(survey, &record, columns).map_err(at_line)?;
+    for row in rows {
+        let FramePixel {
+            cells,
+            frame,
+            pixel,
+        } = row.map_err(bad)?;
         let placement = &placements[frame];
         let camera = survey.cameras.of(frame);
         let mask = survey.frames.masks().of(frame).map(AsRef::as_ref);
@@ -66,7 +57,7 @@ pub fn locate_points(
                 [theta_rad, hit.wall.h_m, distance_m].map(|value| format!("{value:.9}"))
             },
         );
-        let fields = record.iter().chain(added.iter().map(String::as_str));
+        let fields = cells.iter().chain(added.iter().map(String::as_str));
         writer.write_record(fields).map_err(written)?;
         count += 1;
         found += usize::from(hit.is_some());
@@ -96,64 +87,4 @@ struct PointsReport<'a> {
     out: &'a Path,
     pixels: usize,
     on_wall: usize,
-}
-
-/// Finds the columns of the input among its headers; returns what is missing.
-fn find_columns(headers: &StringRecord) -> Result<[usize; 3], String> {
-    let mut places = [0; 3];
-    for (place, name) in places.iter_mut().zip(COLUMNS) {
-        let found = headers.iter().position(|header| header == name);
-        *place = found.ok_or_else(|| {
-            format!(
-                "there is no column {name}; the first line must name the columns frame, u and v, \
-                 and has {}",
-                headers.iter().collect::<Vec<_>>().join(", ")
-            )
-        })?;
-    }
-    Ok(places)
-}
-
-/// Frame and pixel of a line.
-fn parse(
-    survey: &Survey,
-    record: &StringRecord,
-    [frame, u, v]: [usize; 3],
-) -> Result<(usize, [f64; 2]), String> {
-    let number = |column: usize| {
-        let text = &record[column];
-        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-        value.ok_or_else(|| format!("`{text}` is not a number of pixels"))
-    };
-    let name = &record[frame];
-    let frame = find_frame(survey, name).map_err(|what| format!("frame {name}: {what}"))?;
-    Ok((frame, [number(u)?, number(v)?]))
-}
-
-/// Finds the frame by the name of its file, the end of its path, or its index.
-///
-/// # Errors
-/// A name of no frame, or of several.
-pub fn find_frame(survey: &Survey, name: &str) -> Result<usize, String> {
-    let count = survey.frames.len();
-    let has_name = |k: &usize| survey.frames[*k].path.ends_with(name);
-    let mut found = (0..count).filter(has_name);
-    match (found.next(), found.next()) {
-        (Some(only), None) => Ok(only),
-        (Some(first), Some(second)) => Err(format!(
-            "{} and {} both have this name; give the folder, too, or an index \
-             from 0 to {}",
-            printed(&survey.frames[first].path),
-            printed(&survey.frames[second].path),
-            count - 1
-        )),
-        _ => name.parse().ok().filter(|k| *k < count).ok_or_else(|| {
-            format!(
-                "no such frame; give the name of a file, as {}, or an index from \
-                 0 to {}",
-                survey.frames[0].name(),
-                count - 1
-            )
-        }),
-    }
 }

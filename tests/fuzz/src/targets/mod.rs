@@ -6,12 +6,14 @@ pub mod centreline;
 pub mod checkpoint;
 pub mod covariances;
 pub mod discovery;
+pub mod frame_pixels;
 pub mod frame_times;
 pub mod frames_of_reference;
 pub mod gyro;
 pub mod jobs;
 pub mod mark_changes;
 pub mod marks;
+pub mod matrix_folders;
 pub mod names;
 pub mod pictures;
 pub mod plan;
@@ -31,18 +33,20 @@ pub mod words;
 pub type Target = fn(&[u8]);
 
 /// All targets by their names.
-pub const TARGETS: [(&str, Target); 25] = [
+pub const TARGETS: [(&str, Target); 27] = [
     ("calibration", calibration::run),
     ("centreline", centreline::run),
     ("checkpoint", checkpoint::run),
     ("covariances", covariances::run),
     ("discovery", discovery::run),
+    ("frame_pixels", frame_pixels::run),
     ("frame_times", frame_times::run),
     ("frames_of_reference", frames_of_reference::run),
     ("gyro", gyro::run),
     ("jobs", jobs::run),
     ("mark_changes", mark_changes::run),
     ("marks", marks::run),
+    ("matrix_folders", matrix_folders::run),
     ("names", names::run),
     ("pictures", pictures::run),
     ("plan", plan::run),
