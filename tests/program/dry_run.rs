@@ -72,6 +72,23 @@ fn jobs_are_described_and_nothing_is_written() {
     ];
     let compare = job(&[&compare, &size[..]].concat(), dir);
     assert!(writes(&compare, "truth.png"));
+    let report = [
+        "report",
+        text(dir),
+        "--refined",
+        text(&truth),
+        "--out",
+        text(&out),
+    ];
+    let report = job(&report, dir);
+    assert!(writes(&report, "report.html") && writes(&report, "report.json"));
+    assert_eq!(report["frames"], 4);
+    let demo = job(&["demo", "--turns", "2", "--out", text(&out)], dir);
+    assert!(writes(&demo, "survey") && writes(&demo, "report"));
+    assert_eq!(
+        demo["amount"],
+        "24 frames to simulate, refine, compare and report"
+    );
     // The panoramas have the sizes that are announced.
     let drawn = ["stitch", text(dir), "--out", text(&wall), "--json"];
     let drawn: Value = serde_json::from_str(&succeed(&[&drawn, &size[..]].concat())).unwrap();

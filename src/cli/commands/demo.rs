@@ -5,7 +5,7 @@ use super::overlay::leave_out_overlay;
 use super::refine_files::{check_outputs, stage_refined};
 use super::refine_summary::print_summary;
 use super::report::stage_report;
-use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
+use crate::cli::output::{DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::{Comparison, compare_survey};
 use crate::files::printed;
 use crate::persist::atomic;
@@ -42,7 +42,12 @@ pub struct DemoArguments {
     /// Random seed of wall, jitter and noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    dry_run: DryRunArguments,
 }
+
+/// Frames of a turn of the camera.
+const FRAMES_PER_TURN: usize = 12;
 
 /// Folders of the demo's steps.
 struct DemoFolders {
@@ -70,10 +75,13 @@ pub fn run(
         compared: folder("compare"),
         report: folder("report"),
     };
+    if arguments.dry_run.is_set() {
+        return describe(arguments, &folders).print(terminal);
+    }
     let (survey_path, refined_path) = (printed(&folders.survey), printed(&folders.refined));
     let compare_path = printed(&folders.compared);
     let options = SimulateOptions {
-        frames: 12 * usize::from(arguments.turns),
+        frames: FRAMES_PER_TURN * usize::from(arguments.turns),
         seed: arguments.seed,
         ..SimulateOptions::free()
     };
@@ -127,6 +135,28 @@ pub fn run(
         since.elapsed().as_secs_f64()
     ));
     Ok(())
+}
+
+/// The work of the demo, for `--dry-run`.
+fn describe(arguments: &DemoArguments, folders: &DemoFolders) -> Job {
+    let DemoFolders {
+        survey,
+        refined,
+        compared,
+        report,
+    } = folders;
+    let frames = FRAMES_PER_TURN * usize::from(arguments.turns);
+    let mut writes = [survey, refined, compared, report]
+        .map(PathBuf::clone)
+        .to_vec();
+    writes.push(arguments.out.join(RUN_FILE));
+    Job {
+        writes,
+        amount: Some(format!(
+            "{frames} frames to simulate, refine, compare and report"
+        )),
+        ..Job::default()
+    }
 }
 
 /// Compares initial, refined and true poses and writes the report; returns the comparison and the

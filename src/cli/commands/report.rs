@@ -2,13 +2,16 @@
 
 use crate::cli::arguments::{PoseReadingArguments, positive};
 use crate::cli::commands::overlay::leave_out_overlay;
-use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
+use crate::cli::output::{
+    DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
+};
 use crate::evaluate::compare_survey;
 use crate::files::printed;
 use crate::persist::atomic::{self, OutputSet, StagedFolder};
 use crate::progress::Progress;
 use crate::render::Interpolation;
 use crate::report::{self, PICTURES, RefinedFiles, Report, Sources};
+use crate::survey::Survey;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -36,6 +39,8 @@ pub struct ReportArguments {
     px_per_metre: Option<f64>,
     #[command(flatten)]
     reading: PoseReadingArguments,
+    #[command(flatten)]
+    dry_run: DryRunArguments,
 }
 
 /// Runs the command.
@@ -53,6 +58,9 @@ pub fn run(
             .open_beside(&arguments.survey, &arguments.refined, terminal)?;
     let refined = RefinedFiles::read(&survey, &arguments.refined)?;
     leave_out_overlay(&mut survey, terminal)?;
+    if arguments.dry_run.is_set() {
+        return describe(&survey, &refined, &arguments.out).print(terminal);
+    }
     let px_per_metre = match arguments.px_per_metre {
         Some(px_per_metre) => Some(px_per_metre),
         None => report::choose_resolution(&survey, &refined.poses)?,
@@ -87,6 +95,16 @@ pub fn run(
         printed(&arguments.out.join("report.html"))
     ));
     Ok(())
+}
+
+/// The work of a report, for `--dry-run`.
+fn describe(survey: &Survey, refined: &RefinedFiles, out: &Path) -> Job {
+    let files = refined.files();
+    let names = ["report.html", "report.json", PICTURES, RUN_FILE];
+    Job {
+        writes: names.map(|name| out.join(name)).to_vec(),
+        ..Job::of(survey, files.iter().map(PathBuf::as_path))
+    }
 }
 
 /// Writes report.html, report.json and report_pictures/ for `out`; returns the report, the text of
