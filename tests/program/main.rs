@@ -23,6 +23,7 @@ mod gopro;
 mod gyro;
 mod habits;
 mod init;
+mod input_slips;
 mod jobs;
 mod lens_slips;
 mod lenses;
