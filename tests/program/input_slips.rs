@@ -1,6 +1,6 @@
 //! Tables of angles, lost poses and stacks of pictures: read, or named with what to do.
 
-use crate::support::{edit, fail, first_frames, succeed, text, tunnelstitch};
+use crate::support::{edit, fail, first_frames, simulate, succeed, text, tunnelstitch};
 use nalgebra::UnitQuaternion;
 use serde_json::Value;
 use std::path::Path;
@@ -133,4 +133,34 @@ fn a_stack_of_pictures_is_refused_with_the_command_that_splits_it() {
         refused.contains("`convert stack.tif frame-%06d.png`"),
         "{refused}"
     );
+}
+
+/// Degrees that are declared as radians: only the pictures tell.
+#[test]
+fn angles_in_the_other_unit_are_named_by_the_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let survey = folder.path().join("survey");
+    let motion = ["--frames", "16", "--turn-deg", "20", "--advance-m", "0.05"];
+    simulate(&survey, &[&motion[..], &["--size", "160x120"]].concat());
+    let mut table = "tx,ty,tz,roll,pitch,yaw\n".to_owned();
+    for stamped in tum::read(&survey.join("baseline.tum")).unwrap() {
+        let (roll, pitch, yaw) = stamped.pose.r_wc.euler_angles();
+        let [roll, pitch, yaw] = [roll, pitch, yaw].map(f64::to_degrees);
+        let t = stamped.pose.t_wc;
+        table += &format!("{},{},{},{roll},{pitch},{yaw}\n", t.x, t.y, t.z);
+    }
+    std::fs::write(survey.join("angles.csv"), table).unwrap();
+    let toml = survey.join("survey.toml");
+    let lines = "initial = \"angles.csv\"\neuler = \"ZYX\"\nangle_unit = \"rad\"";
+    edit(&toml, "truth = \"groundtruth.tum\"\n", "");
+    edit(&toml, "initial = \"baseline.tum\"", lines);
+    let readings = || -> Value {
+        let said = succeed(&["check", text(&survey), "--json"]);
+        let mut check: Value = serde_json::from_str(&said).unwrap();
+        check["readings"]["readings"].take()
+    };
+    let expected = "angles in deg (angle_unit = \"deg\" under [poses])";
+    assert_eq!(readings(), Value::from(vec![expected]));
+    edit(&toml, "\"rad\"", "\"deg\"");
+    assert_eq!(readings(), Value::Null);
 }

@@ -13,7 +13,7 @@ use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{
-    CameraAxes, Convention, Pose, PoseFormat, StampedPose, Trajectory,
+    AngleUnit, CameraAxes, Convention, EulerSequence, Pose, PoseFormat, StampedPose, Trajectory,
 };
 
 /// Units that positions may be given in instead of metres: their names, and their lengths, metres.
@@ -128,6 +128,7 @@ impl Survey {
         });
         let poses = conventions
             .chain(other_texts(section, &given))
+            .chain(self.other_angles())
             .chain(self.shifted_readings(&given))
             .filter(|reading| is_inside(surface, &reading.initial))
             .map(|reading| PoseReading {
@@ -195,6 +196,44 @@ impl Survey {
             };
             is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)
         })
+    }
+
+    /// Readings of angles in the other unit, where that is given, and in the reverse order.
+    fn other_angles(&self) -> Vec<PoseReading> {
+        let section = &self.file.poses;
+        let Some(order) = section.euler.map(EulerSequence::reversed) else {
+            return Vec::new();
+        };
+        let reading = |remedy: String, changed: PosesSection| {
+            let reader = PoseReader::new(&changed, &self.folder, &self.frames_to_pose()).ok()?;
+            let path = self.folder.join(&section.initial);
+            let poses = reader.read(&path, section.missing_poses()).ok()?;
+            Some(PoseReading::of_poses(remedy, 1, poses.trajectory()))
+        };
+        let in_order = || {
+            let remedy =
+                format!("rotations in the order {order} (euler = \"{order}\" under [poses])");
+            let changed = PosesSection {
+                euler: Some(order),
+                ..section.clone()
+            };
+            reading(remedy, changed)
+        };
+        let in_unit = |unit: AngleUnit| {
+            let name = unit.name();
+            let remedy = format!("angles in {name} (angle_unit = \"{name}\" under [poses])");
+            let changed = PosesSection {
+                angle_unit: Some(unit),
+                ..section.clone()
+            };
+            reading(remedy, changed)
+        };
+        let mut units = AngleUnit::ALL.into_iter();
+        let other = units.find(|unit| section.angle_unit.is_some_and(|given| given != *unit));
+        in_order()
+            .into_iter()
+            .chain(other.and_then(in_unit))
+            .collect()
     }
 
     /// Readings whose poses belong to the frames a few places later or earlier.

@@ -25,6 +25,13 @@ impl EulerSequence {
     /// `R = R_x R_y R_z`: omega, phi and kappa of photogrammetry.
     pub const XYZ: Self = Self { factors: [0, 1, 2] };
 
+    /// The reverse order.
+    #[must_use]
+    pub fn reversed(mut self) -> Self {
+        self.factors.reverse();
+        self
+    }
+
     /// The rotation by the angles about x, y and z, radians.
     pub fn rotation(self, angles_rad: [f64; 3]) -> UnitQuaternion<f64> {
         let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
@@ -106,6 +113,14 @@ pub enum AngleUnit {
 impl AngleUnit {
     /// All units.
     pub const ALL: [Self; 2] = [Self::Deg, Self::Rad];
+
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Deg => "deg",
+            Self::Rad => "rad",
+        }
+    }
 
     /// True for a symbol or a name of the unit, in lower case.
     pub(super) fn is_called(self, word: &str) -> bool {
