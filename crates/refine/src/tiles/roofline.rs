@@ -36,43 +36,52 @@ fn shortest_ns(mut work: impl FnMut()) -> f64 {
 
 /// Multiplications and additions per nanosecond, in vectors that stay in registers.
 fn operations_per_ns() -> f64 {
-    const CHAINS: usize = 10;
     const ROUNDS: usize = 20_000;
     let factor = black_box(0.999f32);
     let ns = shortest_ns(|| {
-        let mut sums = [[1.0f32; LANES]; CHAINS];
+        let mut sums = black_box([[1.0f32; LANES]; 8]);
         dispatch_simd(
             #[inline(always)]
             || {
+                let [mut a, mut b, mut c, mut d, mut e, mut f, mut g, mut h] = sums;
                 for _ in 0..ROUNDS {
-                    for sum in &mut sums {
-                        for value in sum {
-                            *value = *value * factor + factor;
-                        }
+                    for l in 0..LANES {
+                        a[l] = a[l] * factor + factor;
+                        b[l] = b[l] * factor + factor;
+                        c[l] = c[l] * factor + factor;
+                        d[l] = d[l] * factor + factor;
+                        e[l] = e[l] * factor + factor;
+                        f[l] = f[l] * factor + factor;
+                        g[l] = g[l] * factor + factor;
+                        h[l] = h[l] * factor + factor;
                     }
                 }
+                sums = [a, b, c, d, e, f, g, h];
             },
         );
         black_box(sums);
     });
-    (2 * LANES * CHAINS * ROUNDS) as f64 / ns
+    (2 * LANES * 8 * ROUNDS) as f64 / ns
 }
 
 /// Bytes read per nanosecond from values that are `count` in number.
 fn bytes_per_ns(count: usize) -> f64 {
     let values = black_box(vec![1.0f32; count]);
     let ns = shortest_ns(|| {
-        let mut sums = [[0.0f32; LANES]; 8];
+        let mut sums = [[0.0f32; LANES]; 4];
         dispatch_simd(
             #[inline(always)]
             || {
-                for chunk in values.chunks_exact(8 * LANES) {
-                    for (sum, values) in sums.iter_mut().zip(chunk.chunks_exact(LANES)) {
-                        for (sum, value) in sum.iter_mut().zip(values) {
-                            *sum += value;
-                        }
+                let [mut a, mut b, mut c, mut d] = [[0.0f32; LANES]; 4];
+                for values in values.as_chunks::<{ 4 * LANES }>().0 {
+                    for l in 0..LANES {
+                        a[l] += values[l];
+                        b[l] += values[LANES + l];
+                        c[l] += values[2 * LANES + l];
+                        d[l] += values[3 * LANES + l];
                     }
                 }
+                sums = [a, b, c, d];
             },
         );
         black_box(sums);
