@@ -1,6 +1,6 @@
 //! Sparse Cholesky factorisation of the normal matrix, by faer.
 
-use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
+use crate::linear::normal_equations::{NormalEquations, Pattern};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
@@ -83,19 +83,19 @@ impl SymbolicFactorisation {
     ) -> Result<Factor<'_>, FactorError> {
         let mut values = Vec::with_capacity(self.structure.row_idx().len());
         for column in 0..pattern.columns() {
+            // The blocks of a column follow each other, the one on the diagonal last.
+            let Some(diagonal) = pattern.block_index(column, column) else {
+                continue;
+            };
+            let first = diagonal + 1 - pattern.rows(column).len();
+            let above = &normal.blocks[first..diagonal];
             for c in 0..FRAME_PARAMETERS {
-                for &row in pattern.rows(column) {
-                    let block: &Block = match pattern.block_index(row, column) {
-                        Some(index) => &normal.blocks[index],
-                        None => continue,
-                    };
-                    if row == column {
-                        values.extend((0..c).map(|r| block[(r, c)]));
-                        values.push(block[(c, c)] * (1.0 + lambda));
-                    } else {
-                        values.extend((0..FRAME_PARAMETERS).map(|r| block[(r, c)]));
-                    }
+                for block in above {
+                    values.extend_from_slice(block.column(c).as_slice());
                 }
+                let own = &normal.blocks[diagonal];
+                values.extend_from_slice(&own.column(c).as_slice()[..c]);
+                values.push(own[(c, c)] * (1.0 + lambda));
             }
         }
         let matrix = SparseColMatRef::new(self.structure.as_ref(), &values);
@@ -198,6 +198,7 @@ impl Factor<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linear::normal_equations::Block;
     use crate::linear::test_dense::random_equations;
 
     fn example() -> (Pattern, NormalEquations, nalgebra::DMatrix<f64>) {

@@ -43,4 +43,14 @@ impl FrameEstimate {
             bias: self.bias + step[7],
         }
     }
+
+    /// The step from `self` to `other`; inverse of [`FrameEstimate::retract`].
+    pub fn local(&self, other: &Self) -> FrameStep {
+        let mut step = FrameStep::zeros();
+        step.fixed_rows_mut::<6>(0)
+            .copy_from(&self.pose.local(&other.pose));
+        step[6] = other.log_gain - self.log_gain;
+        step[7] = other.bias - self.bias;
+        step
+    }
 }

@@ -21,6 +21,16 @@ pub struct Unknowns {
 }
 
 impl Unknowns {
+    /// The steps of every slot and of the shared parameters to other unknowns, without regard to
+    /// the curvature that carries the frames along.
+    pub fn local(&self, other: &Self) -> (Vec<FrameStep>, Kappa) {
+        let frames = self.frames.iter().zip(&other.frames);
+        let frames = frames.map(|(from, to)| from.local(to));
+        let shape = self.shape.iter().zip(&other.shape);
+        let steps = frames.chain(shape.map(|(from, to)| to - from));
+        (steps.collect(), other.kappa - self.kappa)
+    }
+
     /// The unknowns after a step of every slot and of the shared parameters.
     pub fn stepped(&self, step: &[FrameStep], shared: &Kappa) -> Self {
         let (of_frames, of_shape) = step.split_at(self.frames.len());

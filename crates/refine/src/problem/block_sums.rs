@@ -1,9 +1,9 @@
 //! Contribution of a block of the wall to the normal equations.
 
-use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
+use crate::linear::normal_equations::{Block, Pattern};
 use crate::parameters::frame_estimate::FrameStep;
 use crate::problem::intrinsics_terms::IntrinsicsSums;
-use crate::problem::linearisation::FrameContribution;
+use crate::problem::linearisation::{BlockGradient, FrameContribution, Linearisation};
 use crate::problem::observer_column::ObserverColumn;
 use crate::tiles::tile_arrays::SAMPLES;
 use nalgebra::Matrix4;
@@ -107,30 +107,38 @@ impl BlockSums {
         }
     }
 
-    /// Adds the block to the normal equations, their scatter and the frames' contributions.
-    pub fn add_to(
-        &self,
-        pattern: &Pattern,
-        normal: &mut NormalEquations,
-        scatter: &mut [Block],
-        frames: &mut [FrameContribution],
-    ) {
+    /// The gradient; the block has the given row and column.
+    pub fn block_gradient(&self, block: (i64, i64)) -> BlockGradient {
+        let intrinsics = self.intrinsics.as_ref();
+        BlockGradient {
+            block,
+            slots: self.slots.clone(),
+            slot_gradients: self.gradient.clone(),
+            shared: intrinsics.map(IntrinsicsSums::shared_gradient),
+        }
+    }
+
+    /// Adds `factor` times the block to the cost, the normal equations with their border, and the
+    /// frames' contributions.
+    pub fn add_to(&self, pattern: &Pattern, factor: f64, sums: &mut Linearisation) {
+        sums.cost += self.cost * factor;
         for (column, slot) in self.slots.iter().enumerate() {
-            normal.gradient[*slot] += self.gradient[column];
+            sums.normal.gradient[*slot] += self.gradient[column] * factor;
             if let Some(sum) = self.contributions.get(column) {
-                let frame = &mut frames[*slot];
+                let frame = &mut sums.frames[*slot];
                 frame.samples += sum.samples;
-                frame.pixels += sum.pixels;
-                frame.inliers += sum.inliers;
-                frame.square += sum.square;
+                frame.pixels += sum.pixels * factor;
+                frame.inliers += sum.inliers * factor;
+                frame.square += sum.square * factor;
             }
             for row in 0..=column {
-                let block = &self.blocks[self.block_index(row, column)];
-                normal.add_block(pattern, self.slots[row], *slot, block);
-                if let Some(index) = pattern.block_index(self.slots[row], *slot) {
-                    scatter[index] += self.gradient[row] * self.gradient[column].transpose();
-                }
+                let block = self.blocks[self.block_index(row, column)] * factor;
+                sums.normal
+                    .add_block(pattern, self.slots[row], *slot, &block);
             }
+        }
+        if let Some((intrinsics, border)) = self.intrinsics.as_ref().zip(sums.border.as_mut()) {
+            intrinsics.add_to(&self.slots, factor, border);
         }
     }
 }

@@ -13,7 +13,7 @@
 
 use crate::linear::bordered_system::SharedBorder;
 use crate::parameters::calibration::{Kappa, PIXEL_INDICES, PIXEL_PARAMETERS};
-use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::problem::observer_column::ObserverColumn;
 use crate::tiles::frame_samples::SharedJacobian;
 use nalgebra::{Matrix4, Matrix4x2, RowSVector, SMatrix, SVector};
@@ -92,29 +92,19 @@ impl IntrinsicsSums {
         shared
     }
 
-    /// Adds the block to the border, and the outer product of its gradient, with that of its frames
-    /// `slots`, to the scatter of the border.
-    pub fn add_to(
-        &self,
-        slots: &[usize],
-        gradient: &[FrameStep],
-        border: &mut SharedBorder,
-        scatter: &mut SharedBorder,
-    ) {
+    /// Adds `factor` times the block, whose slots are `slots`, to the border.
+    pub fn add_to(&self, slots: &[usize], factor: f64, border: &mut SharedBorder) {
         for (slot, block) in slots.iter().zip(&self.frames) {
             for (column, index) in PIXEL_INDICES.into_iter().enumerate() {
                 let mut target = border.frames[*slot].column_mut(index);
-                target += block.column(column);
+                target += block.column(column) * factor;
             }
         }
-        let shared = self.shared_gradient();
         for (column, index) in PIXEL_INDICES.into_iter().enumerate() {
             for (row, other) in PIXEL_INDICES.into_iter().enumerate() {
-                border.own[(other, index)] += self.own[(row, column)];
+                border.own[(other, index)] += self.own[(row, column)] * factor;
             }
         }
-        border.gradient += shared;
-        let frames = slots.iter().copied().zip(gradient.iter().copied());
-        scatter.add_scatter(frames, &shared);
+        border.gradient += self.shared_gradient() * factor;
     }
 }

@@ -1,7 +1,7 @@
 //! Cost and normal equations of a photometric problem at one estimate.
 
 use crate::linear::bordered_system::SharedBorder;
-use crate::linear::normal_equations::{Block, NormalEquations};
+use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::sparse_cholesky::Factor;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FrameStep;
@@ -24,9 +24,121 @@ pub struct Linearisation {
     pub border: Option<SharedBorder>,
     /// Border of the scatter.
     pub border_scatter: Option<SharedBorder>,
+    /// Gradients of the pixels' cost in every block of the wall, in units of grey levels².
+    pub block_gradients: Vec<BlockGradient>,
+    /// Part of a diagonal block of the normal matrix that constrains the gauge, and its index.
+    pub constraint: Option<(usize, Block)>,
+    /// True if the equations are those of another estimate and their change in a part of the tiles
+    /// ([`crate::problem::linearise_change`]).
+    pub is_updated: bool,
+}
+
+/// Gradient of the pixels' cost in one block of the wall.
+#[derive(Clone, Debug)]
+pub struct BlockGradient {
+    /// Row and column of the block.
+    pub block: (i64, i64),
+    /// Its slots, ascending.
+    pub slots: Vec<usize>,
+    /// Gradient, slot by slot.
+    pub slot_gradients: Vec<FrameStep>,
+    /// Gradient of the shared parameters, if they are estimated.
+    pub shared: Option<Kappa>,
+}
+
+impl BlockGradient {
+    /// Adds `factor` times the gradient of a part of the block, all of whose slots are slots of it.
+    pub fn add(&mut self, part: &Self, factor: f64) {
+        for (slot, gradient) in part.slots.iter().zip(&part.slot_gradients) {
+            if let Ok(index) = self.slots.binary_search(slot) {
+                self.slot_gradients[index] += gradient * factor;
+            }
+        }
+        if let (Some(shared), Some(part)) = (&mut self.shared, &part.shared) {
+            *shared += part * factor;
+        }
+    }
+
+    /// Adds the outer product of the gradient to the scatter and to that of the border.
+    pub fn add_to(
+        &self,
+        pattern: &Pattern,
+        scatter: &mut [Block],
+        border: Option<&mut SharedBorder>,
+    ) {
+        for (column, slot) in self.slots.iter().enumerate() {
+            for row in 0..=column {
+                if let Some(index) = pattern.block_index(self.slots[row], *slot) {
+                    scatter[index] +=
+                        self.slot_gradients[row] * self.slot_gradients[column].transpose();
+                }
+            }
+        }
+        if let Some((border, shared)) = border.zip(self.shared.as_ref()) {
+            let slots = self.slots.iter().copied();
+            border.add_scatter(slots.zip(self.slot_gradients.iter().copied()), shared);
+        }
+    }
 }
 
 impl Linearisation {
+    /// Adds `factor` times the cost, the equations and the frames' contributions of `change`. The
+    /// numbers of samples and the scatter stay.
+    pub fn add(&mut self, change: &Self, factor: f64) {
+        self.cost += change.cost * factor;
+        let (own, other) = (&mut self.normal, &change.normal);
+        for (block, change) in own.blocks.iter_mut().zip(&other.blocks) {
+            *block += change * factor;
+        }
+        for (gradient, change) in own.gradient.iter_mut().zip(&other.gradient) {
+            *gradient += change * factor;
+        }
+        for (frame, change) in self.frames.iter_mut().zip(&change.frames) {
+            frame.pixels += change.pixels * factor;
+            frame.inliers += change.inliers * factor;
+            frame.square += change.square * factor;
+        }
+        if let Some((border, change)) = self.border.as_mut().zip(change.border.as_ref()) {
+            border.add(change, factor);
+        }
+    }
+
+    /// The change of the cost and of its gradient by the quadratic model along a step of all slots
+    /// and of the shared parameters: `gᵀδ + ½ δᵀHδ` and `H δ`.
+    pub fn predict(
+        &self,
+        pattern: &Pattern,
+        (step, shared): (&[FrameStep], &Kappa),
+    ) -> (f64, Vec<FrameStep>, Kappa) {
+        let mut product = vec![FrameStep::zeros(); step.len()];
+        let mut shared_product = Kappa::zeros();
+        for column in 0..pattern.columns() {
+            for &row in pattern.rows(column) {
+                let Some(index) = pattern.block_index(row, column) else {
+                    continue;
+                };
+                let block = &self.normal.blocks[index];
+                product[row] += block * step[column];
+                if row != column {
+                    product[column] += block.tr_mul(&step[row]);
+                }
+            }
+        }
+        let gradient = &self.normal.gradient;
+        let mut slope: f64 = gradient.iter().zip(step).map(|(g, step)| g.dot(step)).sum();
+        if let Some(border) = &self.border {
+            for ((block, product), step) in border.frames.iter().zip(&mut product).zip(step) {
+                *product += block * shared;
+                shared_product += block.tr_mul(step);
+            }
+            shared_product += border.own * shared;
+            slope += border.gradient.dot(shared);
+        }
+        let products = product.iter().zip(step);
+        let square: f64 = products.map(|(p, s)| p.dot(s)).sum::<f64>() + shared_product.dot(shared);
+        (slope + 0.5 * square, product, shared_product)
+    }
+
     /// The step of all slots and of the shared parameters by a factor of the normal matrix that is
     /// damped by λ, with the shared parameters `held` fixed; None if the border is not positive
     /// definite.

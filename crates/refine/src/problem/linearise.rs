@@ -10,13 +10,14 @@ use crate::parameters::unknowns::Unknowns;
 use crate::problem::block_sums::BlockSums;
 use crate::problem::linearisation::{FrameContribution, Linearisation};
 use crate::problem::photometric_problem::PhotometricProblem;
+use crate::problem::tile_share::TileShare;
 use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Gauge;
 
 /// Blocks of tiles that are processed before their sums are added: bounds the memory, whatever the
 /// tunnel's length.
-const BATCH: usize = 64;
+pub const BATCH: usize = 64;
 
 /// Stiffness of the gauge constraint at the first compared frame over that of its pixels. At about
 /// the root of the inverse rounding error, neither rounding moves the frames along the gauge, nor
@@ -49,8 +50,28 @@ impl PhotometricProblem<'_> {
             sums.cost = f64::INFINITY;
             return Ok(sums);
         };
-        self.add_pixels(unknowns, &cameras, &mut sums)?;
-        self.scale_by_noise(&mut sums);
+        self.visit_blocks(unknowns, &cameras, TileShare::All, &mut |place, block| {
+            self.add_block(place, block, &mut sums);
+        })?;
+        self.complete(unknowns, &mut sums);
+        Ok(sums)
+    }
+
+    /// Adds to the pixels' part of the equations all other terms and the gauge constraint.
+    pub(super) fn complete(&self, unknowns: &Unknowns, sums: &mut Linearisation) {
+        self.scale_by_noise(sums);
+        self.add_others(unknowns, sums);
+        if self.held_frame_count() == 0 {
+            let slot = self.gauge_slot.unwrap_or(0);
+            let gauge = self.context.gauge();
+            let first = &unknowns.frames[slot];
+            sums.constraint = self.constrain_gauge(slot, first, &gauge, &mut sums.normal);
+        }
+    }
+
+    /// Adds all terms but those of the pixels.
+    pub(super) fn add_others(&self, unknowns: &Unknowns, sums: &mut Linearisation) {
+        let (calibration, kappa) = (&self.context.calibration, &unknowns.kappa);
         sums.cost += self.add_prior(unknowns, &mut sums.normal, sums.border.as_mut());
         sums.cost += self.add_points(&unknowns.shape, &mut sums.normal);
         if let Some(border) = &mut sums.border {
@@ -59,16 +80,10 @@ impl PhotometricProblem<'_> {
             border.gradient[RADIUS_INDEX] -= self.log_volume_slope();
             border.apply_prior(calibration, kappa);
         }
-        if self.held_frame_count() == 0 {
-            let slot = self.gauge_slot.unwrap_or(0);
-            let gauge = self.context.gauge();
-            self.constrain_gauge(slot, &unknowns.frames[slot], &gauge, &mut sums.normal);
-        }
-        Ok(sums)
     }
 
     /// A linearisation without any terms.
-    fn zero_linearisation(&self) -> Linearisation {
+    pub(super) fn zero_linearisation(&self) -> Linearisation {
         let border = self
             .estimates_shared
             .then(|| SharedBorder::zeros(self.pattern.columns()));
@@ -79,41 +94,32 @@ impl PhotometricProblem<'_> {
             frames: vec![FrameContribution::default(); self.active.len()],
             border_scatter: border.clone(),
             border,
+            block_gradients: Vec::new(),
+            constraint: None,
+            is_updated: false,
         }
     }
 
-    /// Adds the pixels' part, in units of grey levels², block by block of the wall.
-    fn add_pixels(
-        &self,
-        unknowns: &Unknowns,
-        cameras: &Cameras,
-        sums: &mut Linearisation,
-    ) -> Result<(), ProblemError> {
-        self.visit_blocks(unknowns, cameras, &mut |_, block| {
-            sums.cost += block.cost;
-            block.add_to(
-                &self.pattern,
-                &mut sums.normal,
-                &mut sums.scatter,
-                &mut sums.frames,
-            );
-            if let Some(((intrinsics, border), scatter)) = block
-                .intrinsics
-                .as_ref()
-                .zip(sums.border.as_mut())
-                .zip(sums.border_scatter.as_mut())
-            {
-                intrinsics.add_to(&block.slots, &block.gradient, border, scatter);
-            }
-        })
+    /// Adds a block of the wall, with its row and column, to the pixels' part, in units of grey
+    /// levels².
+    pub(super) fn add_block(&self, place: (i64, i64), block: &BlockSums, sums: &mut Linearisation) {
+        block.add_to(&self.pattern, 1.0, sums);
+        let gradient = block.block_gradient(place);
+        gradient.add_to(
+            &self.pattern,
+            &mut sums.scatter,
+            sums.border_scatter.as_mut(),
+        );
+        sums.block_gradients.push(gradient);
     }
 
-    /// Sums over every block of the wall, and visits them in a fixed order with row and column of
-    /// the block.
+    /// Sums over the given share of the tiles of every block of the wall, and visits them in a
+    /// fixed order with row and column of the block.
     pub(super) fn visit_blocks(
         &self,
         unknowns: &Unknowns,
         cameras: &Cameras,
+        share: TileShare,
         visit: &mut dyn FnMut((i64, i64), &BlockSums),
     ) -> Result<(), ProblemError> {
         let estimates = &self.with_active(&unknowns.frames);
@@ -133,7 +139,7 @@ impl PhotometricProblem<'_> {
             for batch in visibility.blocks.chunks(BATCH) {
                 let blocks: Vec<BlockSums> = batch.par_map(|block| {
                     let wall = (surface.as_ref(), cameras);
-                    self.sum_block(stretch, &visibility, block, &sampled_frames, wall)
+                    self.sum_block((stretch, share), &visibility, block, &sampled_frames, wall)
                 });
                 for (tiles, block) in batch.iter().zip(&blocks) {
                     visit(visibility.tiles[tiles.start].id.block(), block);
@@ -144,7 +150,7 @@ impl PhotometricProblem<'_> {
     }
 
     /// Multiplies the pixels' part by [`Self::information`].
-    fn scale_by_noise(&self, sums: &mut Linearisation) {
+    pub(super) fn scale_by_noise(&self, sums: &mut Linearisation) {
         let information = self.information();
         sums.cost *= information;
         let NormalEquations { blocks, gradient } = &mut sums.normal;
@@ -256,26 +262,26 @@ impl PhotometricProblem<'_> {
     /// rounding would determine the step.
     ///
     /// Cost and gradient do not change: the position along the gauge follows in closed form from
-    /// the prior ([`crate::model::prior::Prior::align_gauge`]).
+    /// the prior ([`crate::model::prior::Prior::align_gauge`]). Returns the constraint, with the
+    /// index of its block.
     fn constrain_gauge(
         &self,
         slot: usize,
         first: &FrameEstimate,
         gauge: &Gauge,
         normal: &mut NormalEquations,
-    ) {
-        let Some(index) = self.pattern.block_index(slot, slot) else {
-            return;
-        };
+    ) -> Option<(usize, Block)> {
+        let index = self.pattern.block_index(slot, slot)?;
         let pose_block = normal.blocks[index].fixed_view::<6, 6>(0, 0).into_owned();
+        let mut constraint = Block::zeros();
         for direction in gauge.directions(&first.pose) {
             let stiffness = (direction.transpose() * pose_block * direction)[0]
                 / direction.norm_squared().powi(2);
-            let constraint =
-                direction * direction.transpose() * (GAUGE_STIFFNESS_RATIO * stiffness);
-            let mut block = normal.blocks[index].fixed_view_mut::<6, 6>(0, 0);
-            block += constraint;
+            let mut of_pose = constraint.fixed_view_mut::<6, 6>(0, 0);
+            of_pose += direction * direction.transpose() * (GAUGE_STIFFNESS_RATIO * stiffness);
         }
+        normal.blocks[index] += constraint;
+        Some((index, constraint))
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! EstimationContext, Sampling, FrameWindow
-//!      │  noise_estimation: noise, model of the wall, outliers
+//!      │  noise_estimation: noise, model of the wall; outlier_exclusion
 //!      ▼
 //! PhotometricProblem
 //!      │  linearise (estimates, κ): per block of the wall, in parallel,
@@ -11,6 +11,9 @@
 //!      ▼
 //! Linearisation: cost, NormalEquations, scatter, SharedBorder
 //! ```
+//!
+//! Near an estimate at which it was linearised, [`linearise_change`] updates the equations by a
+//! share of the tiles.
 //!
 //! The objective is that of [`crate::tiles::tile`]. [`set_up`] has the steps of the set-up.
 //! [`step_length`] measures a step on the wall; [`unknown_texture`] reduces the information to that
@@ -22,8 +25,10 @@ pub mod block_sums;
 pub mod intrinsics_terms;
 pub mod linearisation;
 pub mod linearise;
+pub mod linearise_change;
 pub mod noise_estimation;
 pub mod observer_column;
+pub mod outlier_exclusion;
 pub mod patch_scores;
 pub mod photometric_problem;
 pub mod set_up;
@@ -32,4 +37,5 @@ pub mod step_length;
 pub mod sum_block;
 #[cfg(test)]
 mod test_ring;
+pub mod tile_share;
 pub mod unknown_texture;

@@ -1,14 +1,11 @@
-//! Estimates from the samples before a solve: noise, model of the wall, and outliers.
+//! Estimates from the samples before a solve: noise, model of the wall, and typical misfits.
 
 use crate::joint::joint_block::{JointBlock, WallModel};
 use crate::joint::stiffness::StiffnessSums;
-use crate::model::context::FrameWindow;
 use crate::model::problem_error::ProblemError;
 use crate::problem::photometric_problem::PhotometricProblem;
-use crate::samples::excluded_tiles::ExcludedTiles;
 use crate::samples::observer::Observer;
 use crate::samples::outlier_mask::OutlierMask;
-use crate::samples::sampling::Sampling;
 use crate::samples::visibility::{Tile, Visibility};
 use crate::thresholds::photometric_problem::MAX_NOISE_UNDERESTIMATE;
 use crate::tiles::denoising::TextureSpectrum;
@@ -18,7 +15,6 @@ use crate::tiles::interpolation::Interpolation;
 use crate::tiles::residual_weighting::NoiseHistogram;
 use crate::tiles::workspace::{Misfit, TileObservation, TileWorkspace};
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::ops::Range;
 use tunnelstitch_core::frames::noise_at_level;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -155,56 +151,8 @@ impl PhotometricProblem<'_> {
         )
     }
 
-    /// Excludes the observations that do not show the wall ([`OutlierMask`]), detected in the tiles
-    /// of the problem, or, if a `density` is given, in those of another lattice over all of the
-    /// wall.
-    ///
-    /// # Errors
-    /// [`ProblemError`].
-    pub fn exclude_outliers(mut self, density: Option<f64>) -> Result<Self, ProblemError> {
-        let mut mask = match density {
-            None => self.empty_outlier_mask()?,
-            Some(density) => {
-                let sampling = Sampling {
-                    density,
-                    joint: false,
-                    ..self.sampling
-                };
-                let window = FrameWindow {
-                    participants: self.participants.clone(),
-                    active: self.active.clone(),
-                    estimates: &self.estimates,
-                    compared: Cow::Owned(self.coverage.compared()),
-                };
-                let other = Self::new(&self.context, sampling, window)?;
-                let mut mask = other.empty_outlier_mask()?;
-                for stretch in 0..other.coverage.len() {
-                    let visibility = other.coverage.visibility(stretch);
-                    other.detect_outliers(stretch, &visibility, &mut mask)?;
-                }
-                mask
-            }
-        };
-        let mut excluded = Vec::new();
-        let mut excluded_tiles = ExcludedTiles::default();
-        for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch);
-            if density.is_none() {
-                mask.clear();
-                self.detect_outliers(stretch, &visibility, &mut mask)?;
-            }
-            let participants = self.coverage.frames(stretch);
-            let marks = mask.mark(&visibility, &self.grid, participants);
-            excluded_tiles.add(&visibility, &marks);
-            excluded.push(marks);
-        }
-        self.excluded_tiles = excluded_tiles;
-        self.coverage.exclude(excluded);
-        Ok(self)
-    }
-
     /// An outlier mask without outliers, with the typical misfits of the wall.
-    fn empty_outlier_mask(&self) -> Result<OutlierMask, ProblemError> {
+    pub(super) fn empty_outlier_mask(&self) -> Result<OutlierMask, ProblemError> {
         let gather = |misfits: &mut Vec<Misfit>, tile: &mut ObservedTile| {
             dispatch_simd(
                 #[inline(always)]
@@ -218,26 +166,6 @@ impl PhotometricProblem<'_> {
         };
         let misfits = self.gather_from_tiles(NOISE_ESTIMATION_TILES, gather)?;
         Ok(OutlierMask::new(self.grid, misfits.concat()))
-    }
-
-    /// Adds the outliers of a stretch to a mask.
-    fn detect_outliers(
-        &self,
-        stretch: usize,
-        visibility: &Visibility,
-        mask: &mut OutlierMask,
-    ) -> Result<(), ProblemError> {
-        let participants = self.coverage.frames(stretch);
-        let pyramids = self.images.load(participants)?;
-        let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
-        mask.detect(
-            self.context.surface.as_ref(),
-            visibility,
-            participants,
-            &sampled_frames,
-            &self.noise,
-        );
-        Ok(())
     }
 
     /// Applies `work` to about `count` tiles spread over all of the wall, or to all tiles if there

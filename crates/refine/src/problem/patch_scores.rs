@@ -1,9 +1,8 @@
 //! Scores of patches of the wall: the gradients that the pixels of each patch contribute.
 
-use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameStep;
-use crate::parameters::unknowns::Unknowns;
+use crate::problem::linearisation::BlockGradient;
 use crate::problem::photometric_problem::PhotometricProblem;
 use std::collections::BTreeMap;
 
@@ -75,17 +74,11 @@ impl PatchScores {
 }
 
 impl PhotometricProblem<'_> {
-    /// The scores of patches of 2 × 2 blocks at the given unknowns, scaled as the gradient of the
-    /// cost is.
-    ///
-    /// # Errors
-    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
-    pub fn patch_scores(&self, unknowns: &Unknowns) -> Result<PatchScores, ProblemError> {
+    /// The scores of patches of 2 × 2 blocks by the gradients of blocks, scaled as the gradient of
+    /// the cost is.
+    pub fn patch_scores(&self, gradients: &[BlockGradient]) -> PatchScores {
         let calibration = &self.context.calibration;
         let mut scores = PatchScores::default();
-        let Some(cameras) = calibration.cameras(&unknowns.kappa) else {
-            return Ok(scores);
-        };
         let information = self.information();
         let free = Kappa::from_fn(|k, _| {
             if calibration.free[k] {
@@ -94,15 +87,19 @@ impl PhotometricProblem<'_> {
                 0.0
             }
         });
-        self.visit_blocks(unknowns, &cameras, &mut |(row, column), block| {
-            let gradient: Vec<FrameStep> = block.gradient.iter().map(|g| g * information).collect();
-            let shared = block.intrinsics.as_ref().map(|sums| sums.shared_gradient());
-            let shared = shared.unwrap_or_else(Kappa::zeros).component_mul(&free);
+        for block in gradients {
+            let gradients = block.slot_gradients.iter();
+            let gradients: Vec<FrameStep> = gradients.map(|g| g * information).collect();
+            let shared = block
+                .shared
+                .unwrap_or_else(Kappa::zeros)
+                .component_mul(&free);
+            let (row, column) = block.block;
             let patch = (row.div_euclid(2), column.div_euclid(2));
-            scores.add(patch, block.slots.iter().copied().zip(&gradient), &shared);
-        })?;
+            scores.add(patch, block.slots.iter().copied().zip(&gradients), &shared);
+        }
         scores.fit();
-        Ok(scores)
+        scores
     }
 }
 
@@ -116,10 +113,8 @@ mod tests {
     fn scores_add_up_to_the_gradient() {
         let ring = Ring::new(1e-4);
         let problem = ring.problem();
-        let mut scores = problem
-            .patch_scores(&problem.unknowns_of(&ring.estimates))
-            .unwrap();
         let at = problem.linearise(&ring.estimates).unwrap();
+        let mut scores = problem.patch_scores(&at.block_gradients);
         let mut prior = crate::linear::normal_equations::NormalEquations::zeros(problem.pattern());
         problem.add_prior(&problem.unknowns_of(&ring.estimates), &mut prior, None);
         for _ in 0..3 {

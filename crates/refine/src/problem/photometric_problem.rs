@@ -11,6 +11,7 @@ use crate::parameters::shape::Shape;
 use crate::parameters::unknowns::Unknowns;
 use crate::points::equations::PointEquations;
 use crate::problem::assumed_texture::AssumedTexture;
+use crate::problem::linearisation::Linearisation;
 use crate::problem::set_up::{min_density, normal_pattern, pixel_size_on_wall, pose_frames};
 use crate::problem::unknown_texture::UnknownTexture;
 use crate::samples::excluded_tiles::ExcludedTiles;
@@ -91,6 +92,8 @@ pub struct PhotometricProblem<'a> {
     pub(super) shape: Option<Arc<Shape>>,
     /// Equations of measured points in its coefficients.
     pub(super) points: Option<Arc<PointEquations>>,
+    /// Cost and normal equations at the initial unknowns, if they are known already.
+    pub(super) initial: Option<Linearisation>,
 }
 
 impl<'a> PhotometricProblem<'a> {
@@ -182,6 +185,7 @@ impl<'a> PhotometricProblem<'a> {
             estimates_shared: false,
             shape,
             points,
+            initial: None,
         };
         problem.estimate_noise()?;
         if sampling.joint {
@@ -234,6 +238,11 @@ impl<'a> PhotometricProblem<'a> {
     /// The shared parameters that are tested only.
     pub fn tested(&self) -> &[bool; SHARED_PARAMETERS] {
         &self.context.calibration.tested
+    }
+
+    /// Cost and normal equations at the initial unknowns, if they are known already; only once.
+    pub fn take_initial_linearisation(&mut self) -> Option<Linearisation> {
+        self.initial.take()
     }
 
     /// Initial values of the unknowns.

@@ -23,6 +23,7 @@ use crate::tiles::grid::{BLOCK, TileId, TilePoints, WallGrid};
 use crate::tiles::residual_weighting::{NoiseModel, median_and_sigma};
 use crate::tiles::workspace::{Misfit, TileWorkspace};
 use std::collections::HashMap;
+use std::ops::Range;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_geometry::surface::Surface;
@@ -110,8 +111,7 @@ impl OutlierMask {
             let tiles = &visibility.tiles[block.clone()];
             let mut workspace = TileWorkspace::default();
             let mut scratch = Vec::new();
-            let mut excess = Vec::new();
-            let mut sums: Vec<Option<Box<BlockExcess>>> = vec![None; sampled_frames.len()];
+            let mut misfits = Vec::new();
             for tile in tiles {
                 let points = TilePoints::new(&self.grid, surface, tile.id, &mut scratch);
                 let observers = visibility.observers(tile);
@@ -122,22 +122,13 @@ impl OutlierMask {
                         workspace.compute_misfits(&points, observations, noise);
                     },
                 );
-                for (observer, misfit) in observers.iter().zip(&workspace.misfits) {
-                    let z = self.typical.excess(misfit);
-                    excess.push(z);
-                    let sums = sums[observer.frame as usize].get_or_insert_default();
-                    sums.add(tile, z.min(MAX_NEIGHBOUR_EXCESS));
-                }
+                misfits.append(&mut workspace.misfits);
             }
-            let mut excess = excess.into_iter();
+            let mut is_outlier = self.find_outliers(visibility, block, &misfits).into_iter();
             let mut outliers = Vec::new();
             for tile in tiles {
-                let observers = visibility.observers(tile).iter().zip(&mut excess);
-                let outlying = observers.filter(|(observer, z)| {
-                    let sums = sums[observer.frame as usize].as_ref();
-                    *z > MIN_OUTLIER_EXCESS
-                        || sums.is_some_and(|sums| sums.combined(tile) > MIN_OUTLIER_EXCESS)
-                });
+                let observers = visibility.observers(tile).iter().zip(&mut is_outlier);
+                let outlying = observers.filter(|(_, is_outlier)| *is_outlier);
                 let outlying = outlying.map(|(observer, _)| participants[observer.frame as usize]);
                 let outlying: Vec<usize> = outlying.collect();
                 if !outlying.is_empty() {
@@ -147,6 +138,37 @@ impl OutlierMask {
             outliers
         });
         self.tiles.extend(outliers.concat());
+    }
+
+    /// True for the outliers among the observers of a block, tile by tile; `misfits` are theirs.
+    pub fn find_outliers(
+        &self,
+        visibility: &Visibility,
+        block: &Range<usize>,
+        misfits: &[Misfit],
+    ) -> Vec<bool> {
+        let tiles = &visibility.tiles[block.clone()];
+        let observers = || tiles.iter().flat_map(|tile| visibility.observers(tile));
+        let frames = observers().map(|o| o.frame as usize + 1).max();
+        let mut sums: Vec<Option<Box<BlockExcess>>> = vec![None; frames.unwrap_or(0)];
+        let excess: Vec<f32> = misfits.iter().map(|m| self.typical.excess(m)).collect();
+        let mut next = excess.iter();
+        for tile in tiles {
+            for (observer, z) in visibility.observers(tile).iter().zip(&mut next) {
+                let sums = sums[observer.frame as usize].get_or_insert_default();
+                sums.add(tile, z.min(MAX_NEIGHBOUR_EXCESS));
+            }
+        }
+        let mut next = excess.iter();
+        let mut is_outlier = Vec::with_capacity(excess.len());
+        for tile in tiles {
+            for (observer, z) in visibility.observers(tile).iter().zip(&mut next) {
+                let sums = sums[observer.frame as usize].as_ref();
+                let is_combined = sums.is_some_and(|s| s.combined(tile) > MIN_OUTLIER_EXCESS);
+                is_outlier.push(*z > MIN_OUTLIER_EXCESS || is_combined);
+            }
+        }
+        is_outlier
     }
 
     /// Marks the outlying observers of a stretch, of this or another lattice `grid`.

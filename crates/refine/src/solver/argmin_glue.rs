@@ -46,15 +46,16 @@ pub fn solve<'a>(
 /// # Errors
 /// The errors of [`solve`], and those of [`Observation::keep`].
 pub fn resume<'a>(
-    problem: PhotometricProblem<'a>,
+    mut problem: PhotometricProblem<'a>,
     stopping: Stopping,
     begun: Option<SolveState>,
     observation: Option<Observation>,
 ) -> Result<Solution<'a>, ProblemError> {
+    let at_start = problem.take_initial_linearisation();
     let (gauss_newton, start, done) = match begun {
         None => {
             let start = problem.initial_unknowns();
-            (DampedGaussNewton::new(stopping), start, 0)
+            (DampedGaussNewton::starting(stopping, at_start), start, 0)
         }
         Some(state) => {
             let gauss_newton = DampedGaussNewton::resume(stopping, &state);

@@ -78,6 +78,9 @@ pub struct SolveState {
     decrement: Option<f64>,
     cost_start: f64,
     steps: Vec<StepRecord>,
+    /// The unknowns from whose equations those at `unknowns` were updated, and the n of the share,
+    /// if they were.
+    updated_from: Option<(Unknowns, usize)>,
 }
 
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
@@ -94,8 +97,9 @@ pub struct SolveState {
 /// would get stuck.
 ///
 /// Frames that a step would make infeasible ([`PhotometricProblem::is_feasible`]) keep their
-/// estimates. The last step, undamped and shorter than the tolerance, is not judged: cost and
-/// equations are those before it.
+/// estimates. After a short step the equations are updated by a share of the tiles
+/// ([`crate::problem::linearise_change`]). The last step, undamped and shorter than the tolerance,
+/// is not judged: cost and equations are those before it.
 ///
 /// Source: P. Wolfe, "Convergence conditions for ascent methods", SIAM Review 11(2), 1969 (the
 /// slope along a step).
@@ -110,6 +114,8 @@ pub struct DampedGaussNewton {
     current: Option<Linearisation>,
     /// The unknowns at which `current` is.
     linearised_at: Unknowns,
+    /// The unknowns from whose equations `current` was updated, and the n of the share, if it was.
+    updated_from: Option<(Unknowns, usize)>,
     cost_start: Option<f64>,
     steps: Vec<StepRecord>,
     stop: Option<StopReason>,
@@ -125,9 +131,18 @@ impl DampedGaussNewton {
             decrement: None,
             current: None,
             linearised_at: Unknowns::default(),
+            updated_from: None,
             cost_start: None,
             steps: Vec::new(),
             stop: None,
+        }
+    }
+
+    /// Before the first step, with the equations at the initial unknowns if they are known.
+    pub fn starting(stopping: Stopping, at_start: Option<Linearisation>) -> Self {
+        Self {
+            current: at_start,
+            ..Self::new(stopping)
         }
     }
 
@@ -139,6 +154,7 @@ impl DampedGaussNewton {
             decrement: state.decrement,
             cost_start: Some(state.cost_start),
             steps: state.steps.clone(),
+            updated_from: state.updated_from.clone(),
             ..Self::new(stopping)
         }
     }
@@ -153,6 +169,7 @@ impl DampedGaussNewton {
             decrement: self.decrement,
             cost_start: self.cost_start.unwrap_or_default(),
             steps: self.steps.clone(),
+            updated_from: self.updated_from.clone(),
         }
     }
 
@@ -173,7 +190,7 @@ impl DampedGaussNewton {
     ) -> Result<(Unknowns, f64), ProblemError> {
         let current = match self.current.take() {
             Some(current) => current,
-            None => problem.linearise_at(unknowns)?,
+            None => self.linearise(problem, unknowns)?,
         };
         self.cost_start.get_or_insert(current.cost);
         let (stepped, next) = self.step(problem, unknowns, current)?;
@@ -213,6 +230,21 @@ impl DampedGaussNewton {
             linearised_at: self.linearised_at,
             record,
         })
+    }
+
+    /// The equations at `unknowns`, where an earlier solve was, updated if they were.
+    fn linearise(
+        &self,
+        problem: &PhotometricProblem,
+        unknowns: &Unknowns,
+    ) -> Result<Linearisation, ProblemError> {
+        match &self.updated_from {
+            Some((from, stride)) => {
+                let at = problem.linearise_at(from)?;
+                problem.linearise_change(&at, (from, unknowns), *stride)
+            }
+            None => problem.linearise_at(unknowns),
+        }
     }
 
     /// One accepted step from `unknowns`, where the problem is linearised as `current`; or the
@@ -258,7 +290,13 @@ impl DampedGaussNewton {
                 self.stop = stop;
                 return Ok((candidate, current));
             }
-            let next = problem.linearise_at(&candidate)?;
+            let share = problem.change_share(&current, step_px);
+            let next = match share {
+                Some(stride) => {
+                    problem.linearise_change(&current, (unknowns, &candidate), stride)?
+                }
+                None => problem.linearise_at(&candidate)?,
+            };
             let left = slope(&step, &shared, &next);
             let settles = step_px < problem.pixel_px()
                 && left.abs() < (1.0 - MIN_SLOPE_REDUCTION) * decrement
@@ -278,6 +316,7 @@ impl DampedGaussNewton {
                     1.0
                 };
                 self.lower_damping();
+                self.updated_from = share.map(|stride| (unknowns.clone(), stride));
                 return Ok((candidate, next));
             }
             undamped_failed |= self.lambda == 0.0;

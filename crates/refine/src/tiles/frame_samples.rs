@@ -2,26 +2,19 @@
 
 use crate::parameters::calibration::{BEND_PARAMETERS, INTRINSIC_PARAMETERS, PIXEL_PARAMETERS};
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::tiles::grid::{Plane, TilePoints, ZERO};
-use crate::tiles::interpolation::{Interpolation, cubic_weights};
-use nalgebra::{Matrix2x6, Matrix3, SMatrix, Vector3};
+use crate::tiles::grid::{Plane, TilePoints};
+use crate::tiles::interpolation::Interpolation;
+use crate::tiles::sample_kernels::{SamplePositions, TileProjection, interpolate};
+use nalgebra::{Matrix2x6, SMatrix, Vector3};
 use tunnelstitch_core::frames::GreyImage;
-use tunnelstitch_geometry::camera::{Camera, LensF32, LensLoop, ProjectF32, Sweep};
-use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::camera::{Camera, LensF32, Sweep};
 use tunnelstitch_geometry::surface::{Surface, bend_jacobian, lens_jacobian, wall_jacobian};
 use tunnelstitch_geometry::trajectory::Pose;
 use tunnelstitch_super_resolve::{PosedCamera, Reading};
 
-/// 2²³: added to a non-negative float, it rounds it to an integer in the last bits of the sum.
-/// Unlike a cast, which saturates, this vectorises.
-const ROUNDING: f32 = 8_388_608.0;
-
 /// `C = ∂(s, h)/∂κ` for the shared parameters that pixels depend on
 /// ([`crate::parameters::calibration::PIXEL_INDICES`]).
 pub type SharedJacobian = SMatrix<f64, 2, PIXEL_PARAMETERS>;
-
-/// For every sample of a tile, the index of the pixel to its upper left in an image.
-type Indices = [u32; ZERO.len()];
 
 /// A frame at one pyramid level with its current estimate, prepared for sampling.
 pub struct SampledFrame<'a> {
@@ -33,7 +26,8 @@ pub struct SampledFrame<'a> {
     pose: Pose,
     /// The pose in the straight tunnel, if the curvature is estimated.
     straightened: Option<Pose>,
-    r_cw: Matrix3<f32>,
+    /// Rotation from the world to the camera, row by row.
+    r_cw: [[f32; 3]; 3],
     gain: f32,
     bias: f32,
     interpolation: Interpolation,
@@ -50,7 +44,8 @@ impl<'a> SampledFrame<'a> {
             lens: LensF32::new(&camera),
             pose: estimate.pose,
             straightened: None,
-            r_cw: r_wc.matrix().transpose().cast(),
+            // The columns of the inverse rotation are the rows.
+            r_cw: r_wc.matrix().cast::<f32>().into(),
             gain: estimate.log_gain.exp() as f32,
             bias: estimate.bias as f32,
             interpolation: Interpolation::Bilinear,
@@ -145,177 +140,26 @@ impl<'a> SampledFrame<'a> {
     ///
     /// NaN where an interpolated pixel has no value. Samples that a step has moved out of the image
     /// repeat its border.
-    #[inline(always)]
     pub fn sample(&self, points: &TilePoints, shade: f32, values: &mut Plane) {
-        match self.lens {
-            LensF32::Pinhole(lens) => self.sample_through(lens, points, shade, values),
-            LensF32::BrownConrady(lens) => self.sample_through(lens, points, shade, values),
-            LensF32::KannalaBrandt(lens) => self.sample_through(lens, points, shade, values),
-            LensF32::WideAngle(_) | LensF32::RollingWideAngle(_) => {
-                self.sample_wide_angle(points, shade, values);
-            }
-            LensF32::RollingPinhole(lens) => self.sample_through(lens, points, shade, values),
-            LensF32::RollingBrownConrady(lens) => self.sample_through(lens, points, shade, values),
-            LensF32::RollingKannalaBrandt(lens) => self.sample_through(lens, points, shade, values),
-        }
-    }
-
-    /// Samples through one kind of lens.
-    #[inline(always)]
-    fn sample_through(
-        &self,
-        lens: impl ProjectF32,
-        points: &TilePoints,
-        shade: f32,
-        values: &mut Plane,
-    ) {
-        let centre = self.centre_in_camera(points);
-        let project = |k: usize| self.project_sample(lens, points, &centre, k);
-        self.sample_projected(project, shade, values);
-    }
-
-    /// Samples through one of the rarer models, whose projection is a loop of its own, so that the
-    /// sampling is compiled once for all of them.
-    fn sample_wide_angle(&self, points: &TilePoints, shade: f32, values: &mut Plane) {
-        let mut projected = [(0.0, 0.0); ZERO.len()];
-        self.lens.run(TileProjection {
-            frame: self,
-            points,
-            projected: &mut projected,
-        });
-        self.sample_projected(|k| projected[k], shade, values);
-    }
-
-    /// The centre of a tile in camera coordinates.
-    #[inline(always)]
-    fn centre_in_camera(&self, points: &TilePoints) -> Vector3<f32> {
-        self.pose.to_camera(&points.centre.x_w).cast()
-    }
-
-    /// Projects sample `k` of a tile, whose centre has the camera coordinates `c`.
-    #[inline(always)]
-    fn project_sample(
-        &self,
-        lens: impl ProjectF32,
-        points: &TilePoints,
-        c: &Vector3<f32>,
-        k: usize,
-    ) -> (f32, f32) {
-        let r = &self.r_cw;
-        let (dx, dy, dz) = (points.dx[k], points.dy[k], points.dz[k]);
-        let x = c.x + r[(0, 0)] * dx + r[(0, 1)] * dy + r[(0, 2)] * dz;
-        let y = c.y + r[(1, 0)] * dx + r[(1, 1)] * dy + r[(1, 2)] * dz;
-        let z = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
-        let (p, q, _) = lens.project_f32(x, y, z);
-        (p, q)
-    }
-
-    /// Samples where `project` has a sample at focal length 1.
-    #[inline(always)]
-    fn sample_projected(
-        &self,
-        project: impl Fn(usize) -> (f32, f32),
-        shade: f32,
-        values: &mut Plane,
-    ) {
-        let [fx, fy, cx, cy] = self.intrinsics;
         let (width, height) = (self.image.width(), self.image.height());
         // The cubic needs one more pixel on either side.
-        let margin = match self.interpolation {
-            Interpolation::Bicubic if width.min(height) >= 4 => 1,
-            _ => 0,
+        let (interpolation, margin) = match self.interpolation {
+            Interpolation::Bicubic if width.min(height) >= 4 => (Interpolation::Bicubic, 1),
+            _ => (Interpolation::Bilinear, 0),
         };
-        let first = margin as f32;
-        let (last_u, last_v) = ((width - 2 - margin) as f32, (height - 2 - margin) as f32);
-        let mut index: Indices = [0; ZERO.len()];
-        let (mut fu, mut fv) = (ZERO, ZERO);
-        for k in 0..ZERO.len() {
-            let (p, q) = project(k);
-            let (u, v) = (fx * p + cx, fy * q + cy);
-            // `max` first: a NaN (a sample behind the camera) becomes the first pixel.
-            let x0 = (u - 0.5).max(first).min(last_u) + ROUNDING;
-            let y0 = (v - 0.5).max(first).min(last_v) + ROUNDING;
-            fu[k] = (u - (x0 - ROUNDING)).clamp(0.0, 1.0);
-            fv[k] = (v - (y0 - ROUNDING)).clamp(0.0, 1.0);
-            index[k] = (y0.to_bits() - ROUNDING.to_bits()) * width as u32
-                + (x0.to_bits() - ROUNDING.to_bits());
-        }
-        match margin {
-            0 => self.bilinear(&index, [&fu, &fv], values),
-            _ => self.bicubic(&index, [&fu, &fv], values),
-        }
-        let (inverse_gain, bias) = (1.0 / self.gain, self.bias / shade);
-        for value in values.iter_mut() {
-            *value = (*value - bias) * inverse_gain;
-        }
-    }
-
-    /// Bilinear interpolation at the fractions `fu`, `fv` from the pixels at `index` to the next.
-    #[inline(always)]
-    fn bilinear(&self, index: &Indices, [fu, fv]: [&Plane; 2], values: &mut Plane) {
-        let (data, width) = (self.image.data(), self.image.width());
-        let (mut upper, mut lower) = ([[0.0f32; 2]; ZERO.len()], [[0.0f32; 2]; ZERO.len()]);
-        for k in 0..ZERO.len() {
-            let top = index[k] as usize;
-            upper[k].copy_from_slice(&data[top..top + 2]);
-            lower[k].copy_from_slice(&data[top + width..top + width + 2]);
-        }
-        for k in 0..ZERO.len() {
-            let a = upper[k][0] + fu[k] * (upper[k][1] - upper[k][0]);
-            let b = lower[k][0] + fu[k] * (lower[k][1] - lower[k][0]);
-            values[k] = a + fv[k] * (b - a);
-        }
-    }
-
-    /// Bicubic interpolation, over four rows first and then over four columns.
-    #[inline(always)]
-    fn bicubic(&self, index: &Indices, [fu, fv]: [&Plane; 2], values: &mut Plane) {
-        let (data, width) = (self.image.data(), self.image.width());
-        let (mut across, mut down) = ([ZERO; 4], [ZERO; 4]);
-        for k in 0..ZERO.len() {
-            let (u, v) = (cubic_weights(fu[k]), cubic_weights(fv[k]));
-            for i in 0..4 {
-                (across[i][k], down[i][k]) = (u[i], v[i]);
-            }
-        }
-        let mut columns = [[0.0f32; 4]; ZERO.len()];
-        for k in 0..ZERO.len() {
-            let start = index[k] as usize - width - 1;
-            for (row, weights) in down.iter().enumerate() {
-                let at = start + row * width;
-                let pixels: &[f32] = &data[at..at + 4];
-                for i in 0..4 {
-                    columns[k][i] += weights[k] * pixels[i];
-                }
-            }
-        }
-        for k in 0..ZERO.len() {
-            let [a, b, c, d] = columns[k];
-            let left = across[0][k] * a + across[1][k] * b;
-            values[k] = left + (across[2][k] * c + across[3][k] * d);
-        }
-    }
-}
-
-/// The projection of the samples of a tile.
-struct TileProjection<'a, 'f> {
-    frame: &'a SampledFrame<'f>,
-    points: &'a TilePoints,
-    projected: &'a mut [(f32, f32); ZERO.len()],
-}
-
-impl LensLoop for TileProjection<'_, '_> {
-    fn run(self, lens: impl ProjectF32) {
-        let (frame, points, projected) = (self.frame, self.points, self.projected);
-        let centre = frame.centre_in_camera(points);
-        dispatch_simd(
-            #[inline(always)]
-            || {
-                for (k, projected) in projected.iter_mut().enumerate() {
-                    *projected = frame.project_sample(lens, points, &centre, k);
-                }
-            },
-        );
+        let centre: Vector3<f32> = self.pose.to_camera(&points.centre.x_w).cast();
+        let projection = TileProjection {
+            intrinsics: self.intrinsics,
+            r_cw: self.r_cw,
+            centre: centre.into(),
+            offsets: [&points.dx, &points.dy, &points.dz],
+            image: self.image,
+            margin,
+        };
+        let mut positions = SamplePositions::NONE;
+        projection.project(self.lens, &mut positions);
+        let light = (self.bias / shade, 1.0 / self.gain);
+        interpolate(interpolation, self.image, &positions, light, values);
     }
 }
 
@@ -323,7 +167,7 @@ impl LensLoop for TileProjection<'_, '_> {
 mod tests {
     use super::*;
     use crate::parameters::calibration::{Calibration, INTRINSIC_PARAMETERS, Kappa};
-    use crate::tiles::grid::{AREA, SIDE, TileId, WallGrid};
+    use crate::tiles::grid::{AREA, SIDE, TileId, WallGrid, ZERO};
     use tunnelstitch_geometry::camera::{DoubleSphere, KannalaBrandt, Lens};
     use tunnelstitch_geometry::surface::{Circle, Surface, WallPoint};
     use tunnelstitch_geometry::trajectory::so3;

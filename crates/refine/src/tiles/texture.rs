@@ -1,9 +1,11 @@
 //! The texture of a tile: mean, median and robust mean of its observers.
 
-use crate::tiles::grid::{Plane, SIDE, TILE, ZERO};
+use crate::thresholds::tile::REWEIGHTING_ITERATIONS;
+use crate::tiles::grid::{LANES, Plane, SIDE, ZERO};
+use crate::tiles::lanes::{Lanes, load, store};
 use crate::tiles::residual_weighting::{Loss, NoiseModel};
-use crate::tiles::tile_arrays::{INTERIOR, Rows, ZERO_ROWS, squared_gradients, with_ring};
-use crate::tiles::workspace::TileWorkspace;
+use crate::tiles::tile_arrays::{INTERIOR, Rows, ZERO_ROWS, squared_gradients_at, with_ring};
+use crate::tiles::workspace::{FrameValues, TileWorkspace};
 
 /// Number of frames from which on the second smallest gradient sets the variance of a sample
 /// instead of the smallest: only of four or more is it below the median one.
@@ -14,19 +16,11 @@ impl TileWorkspace {
     /// Mean of all observers, weighted by `q a²`; 0 where none has a value.
     #[inline(always)]
     pub fn mean(&self) -> Plane {
-        let mut sum = ZERO;
-        let mut total = [1e-12f32; ZERO.len()];
-        for frame in &self.frames {
-            let q = frame.pixels * frame.gain * frame.gain;
-            for k in 0..ZERO.len() {
-                total[k] += q * frame.valid[k];
-                sum[k] += q * frame.values[k];
-            }
+        let mut mean = ZERO;
+        for k in (0..ZERO.len()).step_by(LANES) {
+            store(&mut mean, k, mean_at(&self.frames, k));
         }
-        for (sum, total) in sum.iter_mut().zip(&total) {
-            *sum /= total;
-        }
-        sum
+        mean
     }
 
     /// Median of all observers; an observer without a value counts as the mean, and a sample
@@ -62,32 +56,32 @@ impl TileWorkspace {
         median
     }
 
-    /// One step of iteratively reweighted least squares: sets every weight ω by the residual from
-    /// `reference` and returns the mean with the weights `q a² ω`.
-    ///
-    /// The weighted residuals from that mean sum to zero at every sample, exactly. Otherwise the
-    /// gradient would have a part along the gauge, which only the weak prior constrains.
+    /// Robust mean S of all observers and their weights ω, from the plain mean.
     #[inline(always)]
-    pub fn reweight(&mut self, reference: &Plane, precision: &Plane) -> Plane {
-        let mut sum = ZERO;
-        let mut total = [1e-12f32; ZERO.len()];
-        for frame in &mut self.frames {
-            let q = frame.pixels * frame.gain * frame.gain;
-            let (mut difference, mut w) = (ZERO, ZERO);
-            for k in 0..ZERO.len() {
-                difference[k] = frame.values[k] - reference[k];
-                let e = frame.gain * difference[k];
-                w[k] = frame.valid[k] * Loss::weight(e * e, precision[k]);
-            }
-            for k in 0..ZERO.len() {
-                total[k] += q * w[k];
-                sum[k] += q * w[k] * difference[k];
-            }
-            frame.weights = w;
+    pub fn robust_mean(&mut self, precision: &Plane) -> Plane {
+        let mut texture = ZERO;
+        for k in (0..ZERO.len()).step_by(LANES) {
+            let start = mean_at(&self.frames, k);
+            store(
+                &mut texture,
+                k,
+                robust_mean_at(&mut self.frames, k, start, precision),
+            );
         }
-        let mut texture = *reference;
-        for k in 0..ZERO.len() {
-            texture[k] += sum[k] / total[k];
+        texture
+    }
+
+    /// Robust mean S of all observers and their weights ω, from their median.
+    #[inline(always)]
+    pub fn robust_mean_from_median(&mut self, precision: &Plane) -> Plane {
+        let mut texture = self.median();
+        for k in (0..ZERO.len()).step_by(LANES) {
+            let start = load(&texture, k);
+            store(
+                &mut texture,
+                k,
+                robust_mean_at(&mut self.frames, k, start, precision),
+            );
         }
         texture
     }
@@ -119,24 +113,22 @@ impl TileWorkspace {
     /// gains would change the noise model, and with it the cost.)
     #[inline(always)]
     fn squared_gradient(&self) -> Plane {
-        let (mut smallest, mut second) =
-            ([f32::INFINITY; TILE * SIDE], [f32::INFINITY; TILE * SIDE]);
-        for frame in &self.frames {
-            let square_gain = frame.gain * frame.gain;
-            let squares = squared_gradients(&frame.values);
-            for k in 0..ZERO_ROWS.len() {
-                let square = square_gain * squares[k];
-                second[k] = second[k].min(square.max(smallest[k]));
-                smallest[k] = smallest[k].min(square);
+        let is_second = self.frames.len() >= MIN_FRAMES_FOR_SECOND_SMALLEST_GRADIENT;
+        let mut squares = ZERO_ROWS;
+        for k in (0..ZERO_ROWS.len()).step_by(LANES) {
+            let (mut smallest, mut second) = ([f32::INFINITY; LANES], [f32::INFINITY; LANES]);
+            for frame in &self.frames {
+                let square = squared_gradients_at(&frame.values, k);
+                let square_gain = frame.gain * frame.gain;
+                for l in 0..LANES {
+                    let square = square_gain * square[l];
+                    second[l] = second[l].min(square.max(smallest[l]));
+                    smallest[l] = smallest[l].min(square);
+                }
             }
+            store(&mut squares, k, if is_second { second } else { smallest });
         }
-        with_ring(
-            if self.frames.len() < MIN_FRAMES_FOR_SECOND_SMALLEST_GRADIENT {
-                &smallest
-            } else {
-                &second
-            },
-        )
+        with_ring(&squares)
     }
 
     /// `1/v` at every wall sample.
@@ -147,4 +139,57 @@ impl TileWorkspace {
             |g2| noise.precision(g2),
         )
     }
+}
+
+/// Mean of all observers at the samples from `k` on.
+#[inline(always)]
+fn mean_at(frames: &[FrameValues], k: usize) -> Lanes {
+    let (mut sum, mut total) = ([0.0; LANES], [1e-12; LANES]);
+    for frame in frames {
+        let q = frame.pixels * frame.gain * frame.gain;
+        let (z, valid) = (load(&frame.values, k), load(&frame.valid, k));
+        for l in 0..LANES {
+            total[l] += q * valid[l];
+            sum[l] += q * z[l];
+        }
+    }
+    for l in 0..LANES {
+        sum[l] /= total[l];
+    }
+    sum
+}
+
+/// Iteratively reweighted least squares from `texture` at the samples from `k` on: each step sets
+/// every weight ω by the residual and goes to the mean with the weights `q a² ω`.
+///
+/// The weighted residuals from that mean sum to zero at every sample, exactly. Otherwise the
+/// gradient would have a part along the gauge, which only the weak prior constrains.
+#[inline(always)]
+fn robust_mean_at(
+    frames: &mut [FrameValues],
+    k: usize,
+    mut texture: Lanes,
+    precision: &Plane,
+) -> Lanes {
+    let p = load(precision, k);
+    for _ in 0..REWEIGHTING_ITERATIONS {
+        let (mut sum, mut total) = ([0.0; LANES], [1e-12; LANES]);
+        for frame in &mut *frames {
+            let q = frame.pixels * frame.gain * frame.gain;
+            let (z, valid) = (load(&frame.values, k), load(&frame.valid, k));
+            let mut w = [0.0; LANES];
+            for l in 0..LANES {
+                let difference = z[l] - texture[l];
+                let e = frame.gain * difference;
+                w[l] = valid[l] * Loss::weight(e * e, p[l]);
+                total[l] += q * w[l];
+                sum[l] += q * w[l] * difference;
+            }
+            store(&mut frame.weights, k, w);
+        }
+        for l in 0..LANES {
+            texture[l] += sum[l] / total[l];
+        }
+    }
+    texture
 }

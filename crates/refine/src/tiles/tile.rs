@@ -87,11 +87,11 @@
 //! wall replaces S, and `Σ_x q_i τ ρ` becomes a sum over pixels,
 //! [`crate::joint::joint_block`].
 
-use crate::thresholds::tile::REWEIGHTING_ITERATIONS;
 use crate::tiles::denoising::Denoiser;
-use crate::tiles::grid::{Plane, SIDE, TilePoints};
+use crate::tiles::grid::{LANES, Plane, SIDE, TilePoints};
+use crate::tiles::lanes::load;
 use crate::tiles::residual_weighting::{Loss, NoiseModel};
-use crate::tiles::tile_arrays::{INTERIOR, Rows, SAMPLES, ZERO_ROWS, dot, sum};
+use crate::tiles::tile_arrays::{INTERIOR, Rows, SAMPLES, ZERO_ROWS, add_lanes, sum};
 use crate::tiles::tile_moments::{ObserverMoments, feature_moments, features};
 use crate::tiles::workspace::{FrameValues, TileObservation, TileWorkspace};
 use nalgebra::Vector4;
@@ -120,17 +120,24 @@ impl TileWorkspace {
         spacing_m: (f64, f64),
         weighting: &ResidualWeighting,
     ) {
+        self.sample(points, observations);
+        self.compute_sampled_moments(spacing_m, weighting);
+    }
+
+    /// Fills [`TileWorkspace::moments`] from the observers that are sampled.
+    #[inline(always)]
+    pub fn compute_sampled_moments(
+        &mut self,
+        spacing_m: (f64, f64),
+        weighting: &ResidualWeighting,
+    ) {
         let ResidualWeighting {
             noise,
             variance_weighting,
             denoiser,
         } = *weighting;
-        self.sample(points, observations);
         let precision = self.precision(noise);
-        let mut texture = self.mean();
-        for _ in 0..REWEIGHTING_ITERATIONS {
-            texture = self.reweight(&texture, &precision);
-        }
+        let texture = self.robust_mean(&precision);
         let slopes = [spacing_m.0, spacing_m.1].map(|spacing_m| (0.5 / spacing_m) as f32);
         let covered = self.covered();
         let mut phi = features(&texture, slopes, &covered);
@@ -194,37 +201,50 @@ fn observer_moments(
     precision: &Plane,
     [variance, tau]: [&Rows; 2],
 ) -> ObserverMoments {
-    let (mut e, mut omega, mut w, mut we) = (ZERO_ROWS, ZERO_ROWS, ZERO_ROWS, ZERO_ROWS);
-    let (mut loss, mut valid) = (ZERO_ROWS, ZERO_ROWS);
-    for k in 0..ZERO_ROWS.len() {
+    let (mut g, mut w_sum, mut cost) = ([[0.0; LANES]; 4], [0.0; LANES], [0.0; LANES]);
+    let (mut square, mut pixels, mut inliers) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for k in (0..ZERO_ROWS.len()).step_by(LANES) {
         let c = k + SIDE;
-        e[k] = frame.gain * (frame.values[c] - phi[2][k]);
-        omega[k] = INTERIOR[k] * frame.weights[c];
-        w[k] = tau[k] * omega[k];
-        we[k] = w[k] * e[k];
-        valid[k] = INTERIOR[k] * frame.valid[c];
-        let noise = 0.5 * variance[k];
-        let cost = variance[k] * Loss::relative_loss(e[k] * e[k], precision[c]);
-        loss[k] = tau[k] * (INTERIOR[k] * noise + valid[k] * (cost - noise));
+        let (z, omega, valid) = (
+            load(&frame.values, c),
+            load(&frame.weights, c),
+            load(&frame.valid, c),
+        );
+        let (p, v, t, interior) = (
+            load(precision, c),
+            load(variance, k),
+            load(tau, k),
+            load(&INTERIOR, k),
+        );
+        let (s, h, texture) = (load(&phi[0], k), load(&phi[1], k), load(&phi[2], k));
+        for l in 0..LANES {
+            let e = frame.gain * (z[l] - texture[l]);
+            let omega = interior[l] * omega[l];
+            let w = t[l] * omega;
+            let we = w * e;
+            g[0][l] += we * s[l];
+            g[1][l] += we * h[l];
+            g[2][l] += we * texture[l];
+            g[3][l] += we;
+            w_sum[l] += w;
+            square[l] += omega * e * e;
+            inliers[l] += omega;
+            let valid = interior[l] * valid[l];
+            pixels[l] += valid;
+            let noise = 0.5 * v[l];
+            let loss = v[l] * Loss::relative_loss(e * e, p[l]);
+            cost[l] += t[l] * (interior[l] * noise + valid * (loss - noise));
+        }
     }
     let (q, a) = (f64::from(frame.pixels), f64::from(frame.gain));
-    let mut square = ZERO_ROWS;
-    for k in 0..ZERO_ROWS.len() {
-        square[k] = omega[k] * e[k];
-    }
     // w r = q a² ω τ r = q a (ω τ e).
     ObserverMoments {
-        gradient: Vector4::new(
-            f64::from(dot(&we, &phi[0])),
-            f64::from(dot(&we, &phi[1])),
-            f64::from(dot(&we, &phi[2])),
-            f64::from(sum(&we)),
-        ) * (q * a),
-        weight: q * a * a * f64::from(sum(&w)) / SAMPLES as f64,
-        cost: q * f64::from(sum(&loss)),
-        square: q * f64::from(dot(&square, &e)),
-        pixels: q * f64::from(sum(&valid)),
-        inliers: q * f64::from(sum(&omega)),
+        gradient: Vector4::from_fn(|k, _| f64::from(add_lanes(g[k]))) * (q * a),
+        weight: q * a * a * f64::from(add_lanes(w_sum)) / SAMPLES as f64,
+        cost: q * f64::from(add_lanes(cost)),
+        square: q * f64::from(add_lanes(square)),
+        pixels: q * f64::from(add_lanes(pixels)),
+        inliers: q * f64::from(add_lanes(inliers)),
     }
 }
 

@@ -4,6 +4,7 @@
 //! processor.
 
 use crate::tiles::grid::{LANES, Plane, SIDE, TILE, ZERO};
+use crate::tiles::lanes::{Lanes, lanewise, load, store};
 
 /// Samples of a tile without its ring.
 pub const SAMPLES: usize = TILE * TILE;
@@ -34,16 +35,26 @@ pub const INTERIOR: Rows = {
 #[inline(always)]
 pub fn squared_gradients(texture: &Plane) -> Rows {
     let mut squares = ZERO_ROWS;
-    for (k, value) in squares.iter_mut().enumerate() {
-        let c = k + SIDE;
-        let (left, right) = (texture[c - 1] - texture[c], texture[c + 1] - texture[c]);
-        let (above, below) = (
-            texture[c - SIDE] - texture[c],
-            texture[c + SIDE] - texture[c],
-        );
-        *value = 0.5 * (left * left + right * right + above * above + below * below);
+    for k in (0..ZERO_ROWS.len()).step_by(LANES) {
+        store(&mut squares, k, squared_gradients_at(texture, k));
     }
     squares
+}
+
+/// [`squared_gradients`] at the samples from `k` of [`Rows`] on.
+#[inline(always)]
+pub fn squared_gradients_at(texture: &Plane, k: usize) -> Lanes {
+    let c = k + SIDE;
+    let (own, left, right) = (load(texture, c), load(texture, c - 1), load(texture, c + 1));
+    let (above, below) = (load(texture, c - SIDE), load(texture, c + SIDE));
+    lanewise(
+        #[inline(always)]
+        |l| {
+            let (left, right) = (left[l] - own[l], right[l] - own[l]);
+            let (above, below) = (above[l] - own[l], below[l] - own[l]);
+            0.5 * (left * left + right * right + above * above + below * below)
+        },
+    )
 }
 
 /// The plane of a tile's interior samples, with a ring that repeats its neighbours.
@@ -85,6 +96,6 @@ pub fn sum<const N: usize>(a: &[f32; N]) -> f32 {
 
 /// Adds the lanes.
 #[inline(always)]
-fn add_lanes(s: [f32; LANES]) -> f32 {
+pub fn add_lanes(s: [f32; LANES]) -> f32 {
     ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]))
 }

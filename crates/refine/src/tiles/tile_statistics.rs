@@ -1,6 +1,5 @@
 //! Statistics of a tile beside its moments: misfits, mean values, residuals and slopes.
 
-use crate::thresholds::tile::REWEIGHTING_ITERATIONS;
 use crate::tiles::denoising::TextureSpectrum;
 use crate::tiles::grid::{SIDE, TilePoints};
 use crate::tiles::residual_weighting::{Loss, NoiseHistogram, NoiseModel};
@@ -20,10 +19,7 @@ impl TileWorkspace {
     ) {
         self.sample(points, observations);
         let precision = self.precision(noise);
-        let mut texture = self.median();
-        for _ in 0..REWEIGHTING_ITERATIONS {
-            texture = self.reweight(&texture, &precision);
-        }
+        let texture = self.robust_mean_from_median(&precision);
         self.misfits.clear();
         for frame in &self.frames {
             let (mut loss, mut variance) = (ZERO_ROWS, ZERO_ROWS);

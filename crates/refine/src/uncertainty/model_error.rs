@@ -136,7 +136,9 @@ impl EstimateErrors {
             };
             system.draw(pattern.columns(), frames)
         };
-        let finest = problem.patch_scores(&solution.unknowns)?;
+        let from_to = (&solution.linearised_at, &solution.unknowns);
+        let gradients = problem.block_gradients(&solution.linearisation, from_to)?;
+        let finest = problem.patch_scores(&gradients);
         let mut doubled: Option<PatchScores> = None;
         let mut finest_dispersion = None;
         let mut largest: Option<(ErrorDraws, Patches)> = None;

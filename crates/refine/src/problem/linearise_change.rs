@@ -1,0 +1,261 @@
+//! Update of the equations after a short step, by their change in a share of the tiles.
+//!
+//! With the sums `L(x) = Σ_t L_t(x)` over all tiles t at the estimate x, and a share S of one in n
+//! tiles, spread evenly over the wall, the sums after a step δ to y are
+//!
+//! `L(y) ≈ L(x) + P δ + n Σ_{t ∈ S} (L_t(y) − L_t(x) − P_t δ)`,
+//!
+//! with the prediction P of the quadratic model: `H δ` for the gradient, `gᵀδ + ½ δᵀHδ` for the
+//! cost, and none for the normal matrix. This has no bias, whatever S. L(x) is known exactly, and
+//! so is P δ: only what the model does not predict is estimated from the share, in 2/n of the work.
+//!
+//! That is mostly noise: samples that move by d pixels have other noise, with the variance
+//! `2 (1 − β(d)/β(0))` of its change over that of the noise itself
+//! ([`crate::tiles::interpolation::Interpolation::autocorrelation`]). The share takes n times its
+//! own part for that of all tiles, so that the next step is off by
+//!
+//! `√((n − 1) · 2 (1 − β(d)/β(0)))`   σ.
+//!
+//! The share is the smallest for which this is below [`MAX_ERROR_SIGMA`].
+//!
+//! Gradients of single blocks of the wall have no prediction; they are for their scatter.
+//!
+//! Prior and measured points are computed anew. The stiffness along the gauge stays.
+//!
+//! Source: R. Y. Rubinstein and D. P. Kroese, "Simulation and the Monte Carlo Method", 2016,
+//! section 5.2 (control variates).
+
+use crate::linear::normal_equations::Block;
+use crate::model::problem_error::ProblemError;
+use crate::parameters::calibration::SHARED_PARAMETERS;
+use crate::parameters::unknowns::Unknowns;
+use crate::problem::block_sums::BlockSums;
+use crate::problem::linearisation::{BlockGradient, Linearisation};
+use crate::problem::photometric_problem::PhotometricProblem;
+use crate::problem::tile_share::TileShare;
+use crate::tiles::grid::BLOCK;
+use crate::tiles::tile_arrays::SAMPLES;
+
+/// Largest error of the step after an update, σ: it adds half a percent to the error of an
+/// estimate.
+const MAX_ERROR_SIGMA: f64 = 0.1;
+/// Tiles of a share that each frame has at least, so that they stand for all of it.
+const MIN_FRAME_TILES: usize = 400;
+/// Shares that save work, as sums run twice over them; the smallest has eight tiles of a block.
+const SHARES: [usize; 2] = [BLOCK as usize, BLOCK as usize / 2];
+
+/// Sums over some tiles of a block of the wall.
+struct BlockPart<'s> {
+    /// Row and column of the block.
+    place: (i64, i64),
+    sums: &'s BlockSums,
+}
+
+impl BlockPart<'_> {
+    fn gradient(&self) -> BlockGradient {
+        self.sums.block_gradient(self.place)
+    }
+}
+
+impl PhotometricProblem<'_> {
+    /// The n of the share by which the equations `at` an estimate can be updated after a step that
+    /// moves the wall by up to `step_px`; None if they have to be computed from all tiles: if the
+    /// step is too long, if frames have few tiles, or if they have been updated already.
+    pub fn change_share(&self, at: &Linearisation, step_px: f64) -> Option<usize> {
+        let share = self.share_of(at, step_px);
+        share.filter(|_| !at.is_updated)
+    }
+
+    /// The n of the smallest share with [`MIN_FRAME_TILES`] and an error below
+    /// [`MAX_ERROR_SIGMA`]; None if there is none, or if tiles are not computed one by one.
+    fn share_of(&self, at: &Linearisation, step_px: f64) -> Option<usize> {
+        if self.wall_model.is_some() || self.assumed_texture.is_some() {
+            return None;
+        }
+        let samples = at.frames.iter().map(|frame| frame.samples);
+        let fewest = samples.filter(|samples| *samples > 0).min()? / SAMPLES;
+        let beta = |distance_px| self.sampling.interpolation.autocorrelation(distance_px);
+        let change = 2.0 * (1.0 - beta(step_px / self.pixel_px()) / beta(0.0));
+        let mut shares = SHARES.into_iter();
+        shares.find(|stride| {
+            let error = ((stride - 1) as f64 * change).sqrt();
+            fewest >= stride * MIN_FRAME_TILES && error < MAX_ERROR_SIGMA
+        })
+    }
+
+    /// Cost and normal equations at the unknowns `to`, from those `at` the unknowns `from` and
+    /// their change in one of `stride` tiles.
+    ///
+    /// # Errors
+    /// Those of [`PhotometricProblem::linearise_at`].
+    pub fn linearise_change(
+        &self,
+        at: &Linearisation,
+        (from, to): (&Unknowns, &Unknowns),
+        stride: usize,
+    ) -> Result<Linearisation, ProblemError> {
+        let calibration = &self.context.calibration;
+        if calibration.cameras(&to.kappa).is_none() {
+            return self.linearise_at(to);
+        }
+        let (mut before, mut after) = (self.zero_linearisation(), self.zero_linearisation());
+        let mut next = at.clone();
+        let factor = stride as f64;
+        self.visit_share(from, stride, &mut |k, part| {
+            part.sums.add_to(&self.pattern, factor, &mut before);
+            next.block_gradients[k].add(&part.gradient(), -factor);
+        })?;
+        self.visit_share(to, stride, &mut |k, part| {
+            part.sums.add_to(&self.pattern, factor, &mut after);
+            next.block_gradients[k].add(&part.gradient(), factor);
+        })?;
+        self.scale_by_noise(&mut before);
+        self.scale_by_noise(&mut after);
+        let (of_before, of_after) = (self.others(from), self.others(to));
+        // The pixels' part of the equations that the share does not have.
+        let mut rest = at.clone();
+        if let Some((index, constraint)) = &at.constraint {
+            rest.normal.blocks[*index] -= constraint;
+        }
+        rest.add(&of_before, -1.0);
+        rest.add(&before, -1.0);
+        self.fix_shared(&mut rest);
+        let (step, shared) = from.local(to);
+        let (cost, gradient, shared_gradient) = rest.predict(&self.pattern, (&step, &shared));
+        next.cost += cost;
+        for (sum, change) in next.normal.gradient.iter_mut().zip(&gradient) {
+            *sum += change;
+        }
+        if let Some(border) = &mut next.border {
+            border.gradient += shared_gradient;
+        }
+        for (sums, factor) in [
+            (after, 1.0),
+            (before, -1.0),
+            (of_after, 1.0),
+            (of_before, -1.0),
+        ] {
+            next.add(&sums, factor);
+        }
+        self.fix_shared(&mut next);
+        next.is_updated = true;
+        self.replace_scatter(&mut next);
+        Ok(next)
+    }
+
+    /// All terms but those of the pixels.
+    fn others(&self, unknowns: &Unknowns) -> Linearisation {
+        let mut others = self.zero_linearisation();
+        self.add_others(unknowns, &mut others);
+        others
+    }
+
+    /// Removes the shared parameters from the equations that are not estimated.
+    fn fix_shared(&self, sums: &mut Linearisation) {
+        let calibration = &self.context.calibration;
+        if let Some(border) = &mut sums.border {
+            let fixed = (0..SHARED_PARAMETERS).filter(|k| !calibration.has_equations(*k));
+            fixed.for_each(|k| border.remove(k));
+        }
+    }
+
+    /// The gradients of all blocks of the wall at the unknowns `to`; `at`: the equations at the
+    /// unknowns `from`.
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
+    pub fn block_gradients(
+        &self,
+        at: &Linearisation,
+        (from, to): (&Unknowns, &Unknowns),
+    ) -> Result<Vec<BlockGradient>, ProblemError> {
+        let (step, shared) = from.local(to);
+        let moved = self.wall_step_px(&from.frames, &step, &shared);
+        let step_px = moved.into_iter().fold(0.0, f64::max);
+        let Some(stride) = self.share_of(at, step_px) else {
+            return Ok(self.linearise_at(to)?.block_gradients);
+        };
+        let mut gradients = at.block_gradients.clone();
+        for (unknowns, factor) in [(from, -1.0), (to, 1.0)] {
+            self.visit_share(unknowns, stride, &mut |k, part| {
+                gradients[k].add(&part.gradient(), factor * stride as f64);
+            })?;
+        }
+        Ok(gradients)
+    }
+
+    /// Visits one of `stride` tiles of every block, with the index of the block.
+    fn visit_share(
+        &self,
+        unknowns: &Unknowns,
+        stride: usize,
+        visit: &mut dyn FnMut(usize, BlockPart),
+    ) -> Result<(), ProblemError> {
+        let Some(cameras) = self.context.calibration.cameras(&unknowns.kappa) else {
+            return Ok(());
+        };
+        let mut k = 0;
+        let share = TileShare::OneIn(stride);
+        self.visit_blocks(unknowns, &cameras, share, &mut |place, sums| {
+            visit(k, BlockPart { place, sums });
+            k += 1;
+        })
+    }
+
+    /// Computes the scatter from the gradients of the blocks.
+    fn replace_scatter(&self, sums: &mut Linearisation) {
+        sums.scatter.fill(Block::zeros());
+        if let Some(border) = &mut sums.border_scatter {
+            border.scale(0.0);
+        }
+        for block in &sums.block_gradients {
+            let border = sums.border_scatter.as_mut();
+            block.add_to(&self.pattern, &mut sums.scatter, border);
+        }
+        let square = self.information().powi(2);
+        sums.scatter.iter_mut().for_each(|block| *block *= square);
+        if let Some(border) = &mut sums.border_scatter {
+            border.scale(square);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::parameters::frame_estimate::FrameStep;
+    use crate::problem::test_ring::{Ring, number};
+
+    /// Gradient and cost after a step, by their change in one of four tiles and in all of them.
+    #[test]
+    fn change_in_a_share_is_that_in_all_tiles() {
+        let ring = Ring::new(1e-4);
+        let problem = ring.problem().with_shared_parameters();
+        let from = problem.unknowns_of(&ring.estimates);
+        let at = problem.linearise_at(&from).unwrap();
+        let mut to = from.clone();
+        for (k, frame) in to.frames.iter_mut().enumerate() {
+            let step = FrameStep::from_fn(|n, _| 2e-4 * number(k, 30.0 + n as f64));
+            *frame = frame.retract(&step);
+        }
+        to.kappa[0] += 1e-4;
+        let whole = problem.linearise_at(&to).unwrap();
+        for (stride, most) in [(1, 1e-9), (4, 0.1)] {
+            let updated = problem.linearise_change(&at, (&from, &to), stride).unwrap();
+            let (mut error, mut change) = (0.0, 0.0);
+            for k in 0..to.frames.len() {
+                let expected = whole.normal.gradient[k];
+                error += (updated.normal.gradient[k] - expected).norm_squared();
+                change += (at.normal.gradient[k] - expected).norm_squared();
+            }
+            let relative = f64::sqrt(error / change);
+            assert!(relative < most, "{stride}: {relative}");
+            let cost = (updated.cost - whole.cost) / (at.cost - whole.cost);
+            assert!(cost.abs() < most, "{stride}: {cost}");
+            let scatter = |at: &crate::problem::linearisation::Linearisation| -> f64 {
+                at.scatter.iter().map(|block| block.norm()).sum()
+            };
+            let ratio = scatter(&updated) / scatter(&whole);
+            assert!((ratio - 1.0).abs() < most, "{stride}: {ratio}");
+        }
+    }
+}
