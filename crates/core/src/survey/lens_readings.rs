@@ -4,6 +4,7 @@ use super::calibrate::CalibrationGroup;
 use super::open::Survey;
 use std::path::Path;
 use tunnelstitch_geometry::camera::{BrownCoefficients, Camera, Lens, LensSlip};
+use tunnelstitch_geometry::files::limits::MAX_CALIBRATION_BYTES;
 use tunnelstitch_geometry::files::{decode_text, read_regular};
 
 /// Focal lengths over the given one that are tried: nearer ones are found by estimating them.
@@ -12,8 +13,6 @@ const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
 const NEAREST_FACTORS: [f64; 2] = [0.89, 1.12];
 /// Smallest fraction of the picture that a lens shows.
 const MIN_VISIBLE_FRACTION: f64 = 0.5;
-/// Larger calibrations are not looked at for the line that mends them.
-const MAX_CALIBRATION_BYTES: u64 = 4 << 20;
 
 /// A reading of the camera against the one given.
 #[derive(Clone, Copy, Debug, PartialEq)]

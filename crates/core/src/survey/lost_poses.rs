@@ -51,8 +51,8 @@ impl LostPoses {
             let after = given.get(run.end);
             let onward_m = after.map(|after| distance_m(origin, after));
             let jump_m = distance_m(before, origin).max(onward_m.unwrap_or_default());
-            let begins_again =
-                after.is_some_and(|after| distance_m(origin, after) < distance_m(before, after));
+            let begins_again = (after.zip(onward_m))
+                .is_some_and(|(after, onward_m)| onward_m < distance_m(before, after));
             (jump_m > longest_m).then(|| Self {
                 frames: run.clone(),
                 begins_again,

@@ -2,10 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use tunnelstitch_geometry::trajectory::{PoseFile, PoseFormat, read_poses};
+use tunnelstitch_geometry::trajectory::{PoseFile, PoseFormat, is_matrix_file, read_poses};
 
-/// Extension of the files.
-const EXTENSION: &str = "txt";
 /// Files from which on a folder is tried.
 const MIN_FILES: usize = 2;
 
@@ -28,10 +26,6 @@ pub(super) fn matrix_folders(folder: &Path, files: &[PathBuf]) -> BTreeMap<PathB
 /// True if a file is one of those of one of the folders found.
 pub(super) fn holds(folders: &BTreeMap<PathBuf, PoseFile>, file: &Path) -> bool {
     is_matrix_file(file) && folders.contains_key(parent(file))
-}
-
-fn is_matrix_file(file: &Path) -> bool {
-    file.extension().is_some_and(|found| found == EXTENSION)
 }
 
 fn parent(file: &Path) -> &Path {

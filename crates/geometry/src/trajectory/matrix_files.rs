@@ -36,13 +36,18 @@ fn matrix_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if !name.starts_with('.') && path.extension().is_some_and(|found| found == EXTENSION) {
+        if is_matrix_file(&path) {
             files.push(path);
         }
     }
     files.sort_by(|a, b| compare_path(a, b));
     Ok(files)
+}
+
+/// True for the name of a file that may hold the matrix of a pose.
+pub fn is_matrix_file(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    !name.starts_with('.') && path.extension().is_some_and(|found| found == EXTENSION)
 }
 
 /// Reads the matrix of a file, in however many lines it stands.

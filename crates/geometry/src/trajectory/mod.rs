@@ -97,6 +97,7 @@ pub use error::PoseError;
 pub use euler::{AngleUnit, EulerSequence};
 pub use format::PoseFormat;
 pub use jitter::{Jitter, JitterModel, MAX_SEARCH_VOLUME_DEG3};
+pub use matrix_files::is_matrix_file;
 pub use mount::{cameras_of_rigs, read_camera_in_body};
 pub use plan::{Mounting, PlanTable, Rate, Station, UniformMotion, spiral};
 pub use pose::Pose;

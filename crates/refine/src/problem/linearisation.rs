@@ -13,24 +13,14 @@ pub struct Linearisation {
     pub cost: f64,
     /// Normal equations over the active frames.
     pub normal: NormalEquations,
-    /// Scatter of the scores, in the pattern's order: `Σ_b g_b g_bᵀ` over the blocks b of the wall,
-    /// with `g_b` the gradient of the block's cost.
-    ///
-    /// It estimates the variance of the pixels' gradient for any distribution of the errors.
-    pub scatter: Vec<Block>,
     /// Contribution of each active frame.
     pub frames: Vec<FrameContribution>,
     /// Border of the equations, if the shared parameters are estimated.
     pub border: Option<SharedBorder>,
-    /// Border of the scatter.
-    pub border_scatter: Option<SharedBorder>,
     /// Gradients of the pixels' cost in every block of the wall, in units of grey levels².
     pub block_gradients: Vec<BlockGradient>,
     /// Part of a diagonal block of the normal matrix that constrains the gauge, and its index.
     pub constraint: Option<(usize, Block)>,
-    /// True if the equations are those of another estimate and their change in a part of the tiles
-    /// ([`crate::problem::linearise_change`]).
-    pub is_updated: bool,
 }
 
 /// Gradient of the pixels' cost in one block of the wall.
@@ -58,32 +48,11 @@ impl BlockGradient {
             *shared += part * factor;
         }
     }
-
-    /// Adds the outer product of the gradient to the scatter and to that of the border.
-    pub fn add_to(
-        &self,
-        pattern: &Pattern,
-        scatter: &mut [Block],
-        border: Option<&mut SharedBorder>,
-    ) {
-        for (column, slot) in self.slots.iter().enumerate() {
-            for row in 0..=column {
-                if let Some(index) = pattern.block_index(self.slots[row], *slot) {
-                    scatter[index] +=
-                        self.slot_gradients[row] * self.slot_gradients[column].transpose();
-                }
-            }
-        }
-        if let Some((border, shared)) = border.zip(self.shared.as_ref()) {
-            let slots = self.slots.iter().copied();
-            border.add_scatter(slots.zip(self.slot_gradients.iter().copied()), shared);
-        }
-    }
 }
 
 impl Linearisation {
     /// Adds `factor` times the cost, the equations and the frames' contributions of `change`. The
-    /// numbers of samples and the scatter stay.
+    /// numbers of samples and the gradients of blocks stay.
     pub fn add(&mut self, change: &Self, factor: f64) {
         self.cost += change.cost * factor;
         let (own, other) = (&mut self.normal, &change.normal);

@@ -90,13 +90,10 @@ impl PhotometricProblem<'_> {
         Linearisation {
             cost: 0.0,
             normal: NormalEquations::zeros(&self.pattern),
-            scatter: vec![Block::zeros(); self.pattern.blocks()],
             frames: vec![FrameContribution::default(); self.active.len()],
-            border_scatter: border.clone(),
             border,
             block_gradients: Vec::new(),
             constraint: None,
-            is_updated: false,
         }
     }
 
@@ -104,13 +101,7 @@ impl PhotometricProblem<'_> {
     /// levels².
     pub(super) fn add_block(&self, place: (i64, i64), block: &BlockSums, sums: &mut Linearisation) {
         block.add_to(&self.pattern, 1.0, sums);
-        let gradient = block.block_gradient(place);
-        gradient.add_to(
-            &self.pattern,
-            &mut sums.scatter,
-            sums.border_scatter.as_mut(),
-        );
-        sums.block_gradients.push(gradient);
+        sums.block_gradients.push(block.block_gradient(place));
     }
 
     /// Sums over the given share of the tiles of every block of the wall, and visits them in a
@@ -156,12 +147,8 @@ impl PhotometricProblem<'_> {
         let NormalEquations { blocks, gradient } = &mut sums.normal;
         blocks.iter_mut().for_each(|b| *b *= information);
         gradient.iter_mut().for_each(|g| *g *= information);
-        sums.scatter
-            .iter_mut()
-            .for_each(|b| *b *= information * information);
-        if let (Some(border), Some(scatter)) = (&mut sums.border, &mut sums.border_scatter) {
+        if let Some(border) = &mut sums.border {
             border.scale(information);
-            scatter.scale(information * information);
         }
     }
 

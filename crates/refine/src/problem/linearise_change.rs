@@ -25,7 +25,6 @@
 //! Source: R. Y. Rubinstein and D. P. Kroese, "Simulation and the Monte Carlo Method", 2016,
 //! section 5.2 (control variates).
 
-use crate::linear::normal_equations::Block;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::SHARED_PARAMETERS;
 use crate::parameters::unknowns::Unknowns;
@@ -58,17 +57,11 @@ impl BlockPart<'_> {
 }
 
 impl PhotometricProblem<'_> {
-    /// The n of the share by which the equations `at` an estimate can be updated after a step that
-    /// moves the wall by up to `step_px`; None if they have to be computed from all tiles: if the
-    /// step is too long, if frames have few tiles, or if they have been updated already.
+    /// The n of the smallest share, by which the equations `at` an estimate can be updated after a
+    /// step that moves the wall by up to `step_px`: with [`MIN_FRAME_TILES`] and an error below
+    /// [`MAX_ERROR_SIGMA`]. None if they have to be computed from all tiles: if there is no such
+    /// share, or if tiles are not computed one by one.
     pub fn change_share(&self, at: &Linearisation, step_px: f64) -> Option<usize> {
-        let share = self.share_of(at, step_px);
-        share.filter(|_| !at.is_updated)
-    }
-
-    /// The n of the smallest share with [`MIN_FRAME_TILES`] and an error below
-    /// [`MAX_ERROR_SIGMA`]; None if there is none, or if tiles are not computed one by one.
-    fn share_of(&self, at: &Linearisation, step_px: f64) -> Option<usize> {
         if self.wall_model.is_some() || self.assumed_texture.is_some() {
             return None;
         }
@@ -138,8 +131,6 @@ impl PhotometricProblem<'_> {
             next.add(&sums, factor);
         }
         self.fix_shared(&mut next);
-        next.is_updated = true;
-        self.replace_scatter(&mut next);
         Ok(next)
     }
 
@@ -172,7 +163,7 @@ impl PhotometricProblem<'_> {
         let (step, shared) = from.local(to);
         let moved = self.wall_step_px(&from.frames, &step, &shared);
         let step_px = moved.into_iter().fold(0.0, f64::max);
-        let Some(stride) = self.share_of(at, step_px) else {
+        let Some(stride) = self.change_share(at, step_px) else {
             return Ok(self.linearise_at(to)?.block_gradients);
         };
         let mut gradients = at.block_gradients.clone();
@@ -200,23 +191,6 @@ impl PhotometricProblem<'_> {
             visit(k, BlockPart { place, sums });
             k += 1;
         })
-    }
-
-    /// Computes the scatter from the gradients of the blocks.
-    fn replace_scatter(&self, sums: &mut Linearisation) {
-        sums.scatter.fill(Block::zeros());
-        if let Some(border) = &mut sums.border_scatter {
-            border.scale(0.0);
-        }
-        for block in &sums.block_gradients {
-            let border = sums.border_scatter.as_mut();
-            block.add_to(&self.pattern, &mut sums.scatter, border);
-        }
-        let square = self.information().powi(2);
-        sums.scatter.iter_mut().for_each(|block| *block *= square);
-        if let Some(border) = &mut sums.border_scatter {
-            border.scale(square);
-        }
     }
 }
 
@@ -252,7 +226,8 @@ mod tests {
             let cost = (updated.cost - whole.cost) / (at.cost - whole.cost);
             assert!(cost.abs() < most, "{stride}: {cost}");
             let scatter = |at: &crate::problem::linearisation::Linearisation| -> f64 {
-                at.scatter.iter().map(|block| block.norm()).sum()
+                let blocks = problem.score_scatter(at).blocks;
+                blocks.iter().map(|block| block.norm()).sum()
             };
             let ratio = scatter(&updated) / scatter(&whole);
             assert!((ratio - 1.0).abs() < most, "{stride}: {ratio}");

@@ -9,7 +9,7 @@
 //!      │  sum_block: tiles ─> ObserverColumn ─> BlockSums, IntrinsicsSums;
 //!      │  then prior and gauge constraint
 //!      ▼
-//! Linearisation: cost, NormalEquations, scatter, SharedBorder
+//! Linearisation: cost, NormalEquations, SharedBorder, gradients of blocks ─> ScoreScatter
 //! ```
 //!
 //! Near an estimate at which it was linearised, [`linearise_change`] updates the equations by a
@@ -31,6 +31,7 @@ pub mod observer_column;
 pub mod outlier_exclusion;
 pub mod patch_scores;
 pub mod photometric_problem;
+pub mod score_scatter;
 pub mod set_up;
 pub mod shape_terms;
 pub mod step_length;

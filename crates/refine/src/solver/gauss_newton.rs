@@ -57,7 +57,7 @@ impl Solution<'_> {
     /// Removes the shared parameters from the equations that are tested only.
     pub fn remove_tested(&mut self) {
         let at = &mut self.linearisation;
-        for border in at.border.iter_mut().chain(&mut at.border_scatter) {
+        if let Some(border) = &mut at.border {
             let tested = self.problem.tested().iter().enumerate();
             tested
                 .filter(|(_, tested)| **tested)
@@ -290,7 +290,10 @@ impl DampedGaussNewton {
                 self.stop = stop;
                 return Ok((candidate, current));
             }
-            let share = problem.change_share(&current, step_px);
+            // Equations are updated once: errors would add up.
+            let is_updated = self.updated_from.is_some();
+            let share = (!is_updated).then(|| problem.change_share(&current, step_px));
+            let share = share.flatten();
             let next = match share {
                 Some(stride) => {
                     problem.linearise_change(&current, (unknowns, &candidate), stride)?

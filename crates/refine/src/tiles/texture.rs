@@ -56,32 +56,13 @@ impl TileWorkspace {
         median
     }
 
-    /// Robust mean S of all observers and their weights ω, from the plain mean.
+    /// Robust mean S of all observers and their weights ω, from another mean or the median.
     #[inline(always)]
-    pub fn robust_mean(&mut self, precision: &Plane) -> Plane {
-        let mut texture = ZERO;
-        for k in (0..ZERO.len()).step_by(LANES) {
-            let start = mean_at(&self.frames, k);
-            store(
-                &mut texture,
-                k,
-                robust_mean_at(&mut self.frames, k, start, precision),
-            );
-        }
-        texture
-    }
-
-    /// Robust mean S of all observers and their weights ω, from their median.
-    #[inline(always)]
-    pub fn robust_mean_from_median(&mut self, precision: &Plane) -> Plane {
-        let mut texture = self.median();
+    pub fn robust_mean(&mut self, mut texture: Plane, precision: &Plane) -> Plane {
         for k in (0..ZERO.len()).step_by(LANES) {
             let start = load(&texture, k);
-            store(
-                &mut texture,
-                k,
-                robust_mean_at(&mut self.frames, k, start, precision),
-            );
+            let robust = robust_mean_at(&mut self.frames, k, start, precision);
+            store(&mut texture, k, robust);
         }
         texture
     }

@@ -137,7 +137,8 @@ impl TileWorkspace {
             denoiser,
         } = *weighting;
         let precision = self.precision(noise);
-        let texture = self.robust_mean(&precision);
+        let mean = self.mean();
+        let texture = self.robust_mean(mean, &precision);
         let slopes = [spacing_m.0, spacing_m.1].map(|spacing_m| (0.5 / spacing_m) as f32);
         let covered = self.covered();
         let mut phi = features(&texture, slopes, &covered);

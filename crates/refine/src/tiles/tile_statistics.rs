@@ -19,7 +19,8 @@ impl TileWorkspace {
     ) {
         self.sample(points, observations);
         let precision = self.precision(noise);
-        let texture = self.robust_mean_from_median(&precision);
+        let median = self.median();
+        let texture = self.robust_mean(median, &precision);
         self.misfits.clear();
         for frame in &self.frames {
             let (mut loss, mut variance) = (ZERO_ROWS, ZERO_ROWS);

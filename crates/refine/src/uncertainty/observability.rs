@@ -9,6 +9,7 @@ use crate::linear::bordered_system::{BorderBlock, SchurComplement, SharedBlock, 
 use crate::linear::sparse_cholesky::FactorError;
 use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
+use crate::problem::score_scatter::ScoreScatter;
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::MAX_SIGMA_SHARE;
 use crate::uncertainty::shared_parameter_names::{PARAMETERS, ParameterKind};
@@ -47,16 +48,16 @@ impl Posterior {
     ///
     /// # Errors
     /// [`FactorError`] if the poses' normal matrix is singular.
-    pub fn at(solution: &Solution) -> Result<Option<Self>, FactorError> {
+    pub fn at(solution: &Solution, scatter: &ScoreScatter) -> Result<Option<Self>, FactorError> {
         let (problem, at) = (&solution.problem, &solution.linearisation);
-        let (Some(border), Some(border_scatter)) = (&at.border, &at.border_scatter) else {
+        let (Some(border), Some(border_scatter)) = (&at.border, &scatter.border) else {
             return Ok(None);
         };
         let pattern = problem.pattern();
         let factor = problem.symbolic().factorise(pattern, &at.normal, 0.0)?;
         let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
         let (prior, prior_border) = problem.other_information(&solution.unknowns);
-        let scatter = (reduce_to_shared(pattern, &at.scatter, border_scatter, &w)
+        let scatter = (reduce_to_shared(pattern, &scatter.blocks, border_scatter, &w)
             + reduce_to_shared(pattern, &prior, &prior_border, &w))
             / solution.record.curvature().powi(2);
         Ok(Some(Self { w, schur, scatter }))

@@ -17,6 +17,7 @@
 use crate::linear::normal_equations::Block;
 use crate::model::context::EstimationContext;
 use crate::parameters::frame_estimate::FrameEstimate;
+use crate::problem::score_scatter::ScoreScatter;
 use crate::solver::gauss_newton::Solution;
 use crate::tiles::grid::BLOCK;
 use crate::tiles::tile_arrays::SAMPLES;
@@ -83,6 +84,7 @@ fn compute_dispersion(information: &Block, scatter: &Block) -> Option<(f64, Matr
 pub fn compute_overdispersions(
     context: &EstimationContext,
     solution: &Solution,
+    scatter: &ScoreScatter,
 ) -> Vec<Overdispersion> {
     let at = &solution.linearisation;
     let pattern = solution.problem.pattern();
@@ -91,7 +93,7 @@ pub fn compute_overdispersions(
         let place = pattern.block_index(k, k)?;
         // With all information of the pixels.
         let information = at.normal.blocks[place] * dispersion;
-        let scatter = at.scatter[place] * dispersion.powi(2);
+        let scatter = scatter.blocks[place] * dispersion.powi(2);
         let blocks = (&information, &scatter);
         let patches = at.frames[k].samples as f64 / PATCH as f64;
         Overdispersion::of_frame(context, (k, estimate), blocks, patches)

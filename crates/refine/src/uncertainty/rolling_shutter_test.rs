@@ -87,7 +87,8 @@ pub fn estimate_readout(
         Err(ProblemError::Factor { .. }) => return Ok(None),
         Err(error) => return Err(error),
     };
-    let Ok(Some(posterior)) = Posterior::at(&solution) else {
+    let scatter = solution.problem.score_scatter(&solution.linearisation);
+    let Ok(Some(posterior)) = Posterior::at(&solution, &scatter) else {
         return Ok(None);
     };
     let Some(covariance) = posterior.covariance(&calibration.free) else {

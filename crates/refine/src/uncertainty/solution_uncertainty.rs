@@ -56,7 +56,9 @@ impl SolutionUncertainty {
     ) -> Result<Self, ProblemError> {
         let problem = &solution.problem;
         let frames = solution.unknowns.frames.len();
-        let posterior = Posterior::at(solution).map_err(|source| problem.factor_error(source))?;
+        let scatter = problem.score_scatter(&solution.linearisation);
+        let posterior = Posterior::at(solution, &scatter);
+        let posterior = posterior.map_err(|source| problem.factor_error(source))?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
         let (prior, _) = problem.other_information(&solution.unknowns);
@@ -65,7 +67,7 @@ impl SolutionUncertainty {
             frames,
             &solution.linearisation.normal,
             problem.constrained_gauge_freedoms(),
-            &solution.linearisation.scatter,
+            &scatter.blocks,
             &prior,
             solution.record.curvature(),
         );
@@ -113,7 +115,7 @@ impl SolutionUncertainty {
             },
             model_error: patches.map(|found| ModelErrorReport::new(&found, problem)),
             shared,
-            overdispersions: compute_overdispersions(context, solution),
+            overdispersions: compute_overdispersions(context, solution, &scatter),
             total,
             posterior,
         })
