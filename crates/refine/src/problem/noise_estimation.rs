@@ -30,7 +30,7 @@ const MIN_ALIASED_VARIANCE_RATIO: f64 = 0.05;
 const TILES_PER_TASK: usize = 32;
 /// Number of tiles from which the noise and the typical misfit are estimated: tens of thousands of
 /// residuals.
-const NOISE_ESTIMATION_TILES: usize = 600;
+const NOISE_ESTIMATION_TILES: usize = 2400;
 /// Number of blocks of tiles that are solved for to estimate roughness and stiffness of the wall:
 /// some thousand tiles.
 const WALL_MODEL_BLOCKS: usize = 48;
@@ -57,8 +57,8 @@ impl PhotometricProblem<'_> {
             },
         )?;
         let (mut histogram, mut spectrum) = (NoiseHistogram::default(), TextureSpectrum::default());
-        for (residuals, textures) in &counted {
-            histogram = histogram.merge(residuals);
+        for (residuals, textures) in counted {
+            histogram = histogram.merge(&residuals);
             spectrum = spectrum.merge(textures);
         }
         self.noise = histogram.fit();
@@ -78,8 +78,7 @@ impl PhotometricProblem<'_> {
         }
         // At coarser levels the residuals are mostly misalignment.
         if self.sampling.level == 0 && self.active.len() > 1 {
-            let floor = f64::from(self.noise.floor);
-            self.denoiser = Some(spectrum.denoiser(floor, interpolation));
+            self.denoiser = Some(spectrum.denoiser());
         }
         // The variance of a sample is that of a pixel times `β(0)²`.
         self.sigma = f64::from(self.noise.floor).sqrt() / axis;

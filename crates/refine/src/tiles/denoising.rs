@@ -15,100 +15,113 @@
 //! Let `φ̂` be the slopes of the filtered texture. The mean of `φ̂φ̂ᵀ` is that of `φ̂φᵀ` with the
 //! true slopes φ, the derivative of the score; so M needs no correction for noise.
 //!
-//! With `S = Σ q_i a_i² z_i / Σ q_i a_i²`, the noise of `z_i` has the variance `σ²/a_i²` and, along
-//! each axis, the autocorrelation `β(d)/β(0)` of the interpolation kernel at a distance of d pixels
-//! ([`Interpolation::autocorrelation`]). Samples of frame i are `d_i = √q_i` pixels apart, so that
-//! on average over the tiles
+//! With `S = Σ w_i z_i / W`, `w_i = q_i a_i²` and `W = Σ w_i`, and the variance `s_kl/a_i²` of a
+//! coefficient of `z_i`, on average over the tiles
 //!
-//! `n_kl = σ² ⟨Σ_i u_i ν_k(d_i) ν_l(d_i)⟩`, `u_i = (q_i a_i)² / (Σ_j q_j a_j²)²`,
-//! `ν_k(d) = Σ_ij p_k(i) p_k(j) β(|i − j| d)/β(0)`.
+//! `n_kl = s_kl ⟨Σ_i u_i⟩`, `u_i = (w_i/a_i W)²`.
 //!
-//! An oblique frame has fewer pixels per sample: its noise is more correlated between samples.
+//! `s_kl` is measured: a coefficient `ρ` of a residual `z_i − S` has the variance
+//! `s_kl (1 − w_i/W)/a_i²`. Pixels of a sensor are independent, but compression takes noise from
+//! the high frequencies and adds some to the low ones, where the texture is; oblique frames and
+//! interpolation correlate it, too.
 //!
 //! Source: N. Wiener, "Extrapolation, Interpolation, and Smoothing of Stationary Time Series",
 //! 1949; J. P. Gram, "Ueber die Entwickelung reeller Functionen in Reihen mittelst der Methode der
 //! kleinsten Quadrate", 1883 (the polynomials).
 
 use crate::tiles::grid::{Plane, SIDE, ZERO};
-use crate::tiles::interpolation::Interpolation;
+use tunnelstitch_geometry::numerics::median::upper_fence;
 
 type Square<T> = [[T; SIDE]; SIDE];
 
-/// Sums of the squared coefficients and of the noise gains over tiles of the wall.
+/// Sums of the squared coefficients of the texture over tiles of the wall, and the coefficients of
+/// its noise.
 #[derive(Clone, Debug)]
 pub struct TextureSpectrum {
     /// `p_k(i)`, k the row.
     basis: Square<f64>,
     /// `Σ c_kl²`, l the row.
     squares: Square<f64>,
-    /// `Σ u` by the spacing d, in bins of [`SPACING_PX`].
-    noise_gains: [f64; SPACINGS],
+    /// `Σ u`.
+    noise_gain: f64,
+    /// `a² ρ_kl²/(1 − w/W)` of every frame of every tile.
+    residuals: Vec<Square<f32>>,
 }
 
-/// Width of a bin of spacings, pixels.
-const SPACING_PX: f64 = 1.0 / 32.0;
-/// Number of bins of spacings; the last one holds all larger ones.
-const SPACINGS: usize = 64;
+/// A frame of a tile: its values, its gain a, and its share `w/W` of the weight.
+pub struct TileFrame<'a> {
+    /// Values z at every wall sample.
+    pub values: &'a Plane,
+    /// Gain a, shading included.
+    pub gain: f64,
+    /// Share of the weight, 0 to 1.
+    pub share: f64,
+}
 
 impl Default for TextureSpectrum {
     fn default() -> Self {
         Self {
             basis: polynomials(),
             squares: [[0.0; SIDE]; SIDE],
-            noise_gains: [0.0; SPACINGS],
+            noise_gain: 0.0,
+            residuals: Vec::new(),
         }
     }
 }
 
 impl TextureSpectrum {
-    /// Adds a tile of S; `frames` gives `(d_i, u_i)` of each frame.
-    pub fn add(&mut self, texture: &Plane, frames: impl Iterator<Item = (f64, f64)>) {
+    /// Adds a tile of S that `frames` are fused to.
+    pub fn add<'a>(&mut self, texture: &Plane, frames: impl Iterator<Item = TileFrame<'a>>) {
+        let coefficients = self.coefficients(texture);
+        let squares = self.squares.iter_mut().flatten();
+        squares
+            .zip(coefficients.iter().flatten())
+            .for_each(|(sum, c)| *sum += c * c);
+        for frame in frames {
+            self.noise_gain += (frame.share / frame.gain).powi(2);
+            // S of a single frame leaves no residual.
+            if frame.share == 1.0 {
+                continue;
+            }
+            let mut residual = ZERO;
+            let values = residual.iter_mut().zip(frame.values).zip(texture);
+            values.for_each(|((e, z), s)| *e = z - s);
+            let scale = frame.gain * frame.gain / (1.0 - frame.share);
+            let coefficients = self.coefficients(&residual);
+            self.residuals
+                .push(coefficients.map(|row| row.map(|c| (scale * c * c) as f32)));
+        }
+    }
+
+    /// The coefficients of a tile, l the row.
+    fn coefficients(&self, tile: &Plane) -> Square<f64> {
         let mut along_s = [[0.0; SIDE]; SIDE];
-        for (row, samples) in along_s.iter_mut().zip(texture.chunks_exact(SIDE)) {
+        for (row, samples) in along_s.iter_mut().zip(tile.chunks_exact(SIDE)) {
             for (sum, p) in row.iter_mut().zip(&self.basis) {
                 *sum = p.iter().zip(samples).map(|(p, t)| p * f64::from(*t)).sum();
             }
         }
-        for (squares, p) in self.squares.iter_mut().zip(&self.basis) {
-            for (k, square) in squares.iter_mut().enumerate() {
-                let c: f64 = p.iter().zip(&along_s).map(|(p, row)| p * row[k]).sum();
-                *square += c * c;
-            }
-        }
-        for (spacing_px, gain) in frames {
-            let bin = (spacing_px / SPACING_PX) as usize;
-            self.noise_gains[bin.min(SPACINGS - 1)] += gain;
-        }
+        self.basis.map(|p| {
+            std::array::from_fn(|k| p.iter().zip(&along_s).map(|(p, row)| p * row[k]).sum())
+        })
     }
 
     /// Adds the sums of another spectrum.
-    pub fn merge(mut self, other: &Self) -> Self {
-        let others = other.squares.iter().flatten().chain(&other.noise_gains);
-        let own = self
-            .squares
-            .iter_mut()
-            .flatten()
-            .chain(&mut self.noise_gains);
-        own.zip(others).for_each(|(a, b)| *a += b);
+    pub fn merge(mut self, other: Self) -> Self {
+        let own = self.squares.iter_mut().flatten();
+        own.zip(other.squares.iter().flatten())
+            .for_each(|(a, b)| *a += b);
+        self.noise_gain += other.noise_gain;
+        self.residuals.extend(other.residuals);
         self
     }
 
-    /// The filter for samples with noise of the variance `floor`, σ² (grey levels²).
-    pub fn denoiser(&self, floor: f64, interpolation: Interpolation) -> Denoiser {
-        let mut noise = [[0.0; SIDE]; SIDE];
-        let gains = self.noise_gains.iter().enumerate();
-        for (bin, u) in gains.filter(|(_, u)| **u > 0.0) {
-            let nu = self.nu((bin as f64 + 0.5) * SPACING_PX, interpolation);
-            for (row, nu_l) in noise.iter_mut().zip(&nu) {
-                for (noise, nu_k) in row.iter_mut().zip(&nu) {
-                    *noise += floor * u * nu_l * nu_k;
-                }
-            }
-        }
-        // The mean has no slope: it passes.
-        noise[0][0] = 0.0;
+    /// The filter of the texture.
+    pub fn denoiser(&self) -> Denoiser {
+        let noise = self.noise_spectrum();
         let factor = |l: usize, k: usize| {
-            (1.0 - noise[l][k] / self.squares[l][k].max(f64::MIN_POSITIVE)).max(0.0) as f32
+            let noise = self.noise_gain * noise[l][k];
+            (1.0 - noise / self.squares[l][k].max(f64::MIN_POSITIVE)).max(0.0) as f32
         };
         Denoiser {
             basis: self.basis.map(|p| p.map(|v| v as f32)),
@@ -117,16 +130,28 @@ impl TextureSpectrum {
         }
     }
 
-    /// `ν_k` of samples `spacing_px` apart.
-    fn nu(&self, spacing_px: f64, interpolation: Interpolation) -> [f64; SIDE] {
-        let covariances: [f64; SIDE] =
-            std::array::from_fn(|k| interpolation.autocorrelation(k as f64 * spacing_px));
-        let correlation = |i: usize, j: usize| covariances[i.abs_diff(j)] / covariances[0];
-        std::array::from_fn(|k| {
-            let p = &self.basis[k];
-            let pairs = (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| (i, j)));
-            pairs.map(|(i, j)| p[i] * p[j] * correlation(i, j)).sum()
-        })
+    /// `s_kl`, l the row: means over the residuals whose energy `Σ ρ²` is not beyond
+    /// [`upper_fence`], as that of edges and foreign objects; 0 for the mean of a tile, which has no
+    /// slope and passes.
+    fn noise_spectrum(&self) -> Square<f64> {
+        let energy = |squares: &Square<f32>| squares.iter().flatten().sum::<f32>();
+        let mut energies: Vec<f32> = self.residuals.iter().map(energy).collect();
+        let most = upper_fence(&mut energies);
+        let mut spectrum = [[0.0; SIDE]; SIDE];
+        let mut counted = 0.0;
+        for squares in self
+            .residuals
+            .iter()
+            .filter(|squares| energy(squares) <= most)
+        {
+            counted += 1.0;
+            let sums = spectrum.iter_mut().flatten();
+            let squares = squares.iter().flatten();
+            sums.zip(squares)
+                .for_each(|(sum, square)| *sum += f64::from(*square));
+        }
+        spectrum[0][0] = 0.0;
+        spectrum.map(|row| row.map(|sum| sum / f64::max(counted, 1.0)))
     }
 }
 
@@ -226,29 +251,31 @@ mod tests {
         );
     }
 
-    /// Ramps in uncorrelated noise: the slopes of the filtered tiles have a smaller error than
-    /// those of the noisy ones, and `φ̂²` is on average `φ̂φ`.
+    /// Ramps in uncorrelated noise, seen by two frames: the slopes of the filtered tiles have a
+    /// smaller error than those of the noisy ones, and `φ̂²` is on average `φ̂φ`.
     #[test]
     fn filtered_slopes_are_nearer_to_the_truth_and_their_squares_unbiased() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-        let (slopes, noise) = (
-            Normal::new(0.0f32, 0.5).unwrap(),
-            Normal::new(0.0f32, 2.0).unwrap(),
-        );
+        let slopes = Normal::new(0.0f32, 0.5).unwrap();
+        let noise = Normal::new(0.0f32, 2.0).unwrap();
         let mut spectrum = TextureSpectrum::default();
         let tiles: Vec<(f32, Plane)> = (0..2000)
             .map(|_| {
                 let slope = slopes.sample(&mut rng);
-                let mut tile = ZERO;
-                for (k, value) in tile[..SIDE * SIDE].iter_mut().enumerate() {
-                    *value = slope * (k % SIDE) as f32 + noise.sample(&mut rng);
-                }
-                // Two pixels apart: no correlation.
-                spectrum.add(&tile, [(2.0, 1.0)].into_iter());
-                (slope, tile)
+                let mut frame = || {
+                    let mut tile = ZERO;
+                    for (k, value) in tile[..SIDE * SIDE].iter_mut().enumerate() {
+                        *value = slope * (k % SIDE) as f32 + noise.sample(&mut rng);
+                    }
+                    tile
+                };
+                let frames = [frame(), frame()];
+                let texture = mean_of(&frames);
+                spectrum.add(&texture, frames.iter().map(half_of));
+                (slope, texture)
             })
             .collect();
-        let denoiser = spectrum.denoiser(4.0, Interpolation::Bilinear);
+        let denoiser = spectrum.denoiser();
         let (mut before, mut after, mut square, mut product) = (0.0, 0.0, 0.0, 0.0);
         for (slope, tile) in &tiles {
             let clean = denoiser.apply(tile);
@@ -267,6 +294,20 @@ mod tests {
         assert!((square / product - 1.0).abs() < 0.05, "{square} {product}");
     }
 
+    /// The mean of two frames.
+    fn mean_of(frames: &[Plane; 2]) -> Plane {
+        std::array::from_fn(|k| 0.5 * (frames[0][k] + frames[1][k]))
+    }
+
+    /// A frame of gain 1 with half of the weight.
+    fn half_of(values: &Plane) -> TileFrame<'_> {
+        TileFrame {
+            values,
+            gain: 1.0,
+            share: 0.5,
+        }
+    }
+
     #[test]
     fn filter_without_noise_changes_nothing() {
         let mut tile = ZERO;
@@ -274,8 +315,8 @@ mod tests {
             *value = (7.3 * k as f32).sin() * 50.0;
         }
         let mut spectrum = TextureSpectrum::default();
-        spectrum.add(&tile, [(0.5, 1.0)].into_iter());
-        let denoiser = spectrum.denoiser(0.0, Interpolation::Bilinear);
+        spectrum.add(&tile, [half_of(&tile), half_of(&tile)].into_iter());
+        let denoiser = spectrum.denoiser();
         let filtered = denoiser.apply(&tile);
         assert!(
             tile.iter()

@@ -1,7 +1,7 @@
 //! Noise model of the residuals, robust loss, and robust statistics.
 
 use crate::thresholds::residual_weighting::TUKEY_CUTOFF_SIGMAS;
-use tunnelstitch_geometry::numerics::median::MAD_TO_SIGMA;
+use tunnelstitch_geometry::numerics::median::{MAD_TO_SIGMA, QUARTILE_TO_SIGMA};
 
 /// Variance of the residuals at a wall sample with the texture gradient g (grey levels per sample):
 /// `v(g) = σ² + κ g²`.
@@ -142,8 +142,8 @@ impl NoiseHistogram {
         self
     }
 
-    /// Fits `v(g)` to the robust variance `(1.4826 · median |e|)²` of each gradient bin, by least
-    /// squares weighted by the counts over the variances squared (their sampling variance).
+    /// Fits `v(g)` to the robust variance of each gradient bin, by the upper quartile of `|e|`, by
+    /// least squares weighted by the counts over the variances squared (their sampling variance).
     pub fn fit(&self) -> NoiseModel {
         // Sums of 1, x, x², y, xy with x = g², y = variance.
         let mut m = [0.0f64; 5];
@@ -153,7 +153,7 @@ impl NoiseHistogram {
                 continue;
             }
             let x = gradient_square(row);
-            let y = (MAD_TO_SIGMA * median(counts, total))
+            let y = (QUARTILE_TO_SIGMA * upper_quartile(counts, total))
                 .max(MIN_SIGMA_GREY)
                 .powi(2);
             let w = total as f64 / (y * y);
@@ -222,12 +222,13 @@ fn residual(position: f64) -> f64 {
     f64::from(FIRST_RESIDUAL_GREY) * octave.exp2() * (1.0 + part)
 }
 
-/// Median of the residual magnitudes of one gradient bin.
-fn median(counts: &[u64], total: u64) -> f64 {
+/// Upper quartile of the residual magnitudes of one gradient bin.
+fn upper_quartile(counts: &[u64], total: u64) -> f64 {
+    let rank = total * 3 / 4;
     let mut below = 0;
     for (column, count) in counts.iter().enumerate() {
-        if below + count > total / 2 {
-            let part = (total / 2 - below) as f64 / *count as f64;
+        if below + count > rank {
+            let part = (rank - below) as f64 / *count as f64;
             return residual(column as f64 + part);
         }
         below += count;
@@ -240,6 +241,24 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
+
+    /// Of pictures compressed until neighbours are alike most residuals are zero, and the others as
+    /// large as a step of the quantisation.
+    #[test]
+    fn fit_measures_residuals_most_of_which_are_zero() {
+        let mut histogram = NoiseHistogram::default();
+        for k in 0..100_000u32 {
+            let residual = if k % 100 < 55 {
+                0.0
+            } else {
+                1.0 + 0.01 * (k % 100) as f32
+            };
+            histogram.add(residual, 0.2);
+        }
+        let root_mean_square = (0.45f64 * 1.775f64.powi(2)).sqrt();
+        let sigma = f64::from(histogram.fit().floor).sqrt();
+        assert!((sigma / root_mean_square - 1.0).abs() < 0.3, "{sigma}");
+    }
 
     #[test]
     fn weight_is_the_derivative_of_the_loss_over_the_residual() {

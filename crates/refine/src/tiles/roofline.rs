@@ -111,7 +111,7 @@ fn roofline() {
         floor: 4.0,
         steepness: 0.01,
     };
-    let denoiser = TextureSpectrum::default().denoiser(4.0, Interpolation::Bicubic);
+    let denoiser = TextureSpectrum::default().denoiser();
     let weighting = ResidualWeighting {
         noise: &noise,
         variance_weighting: true,

@@ -256,7 +256,6 @@ mod tests {
     use crate::tiles::denoising::TextureSpectrum;
     use crate::tiles::frame_samples::SampledFrame;
     use crate::tiles::grid::{TileId, WallGrid};
-    use crate::tiles::interpolation::Interpolation;
     use crate::tiles::residual_weighting::NoiseHistogram;
     use nalgebra::Vector3;
     use rand::SeedableRng;
@@ -370,7 +369,7 @@ mod tests {
             for points in &tiles {
                 workspace.count_residuals(points, observations(), &mut histogram, &mut spectrum);
             }
-            let denoiser = spectrum.denoiser(f64::from(model.floor), Interpolation::Bilinear);
+            let denoiser = spectrum.denoiser();
             let mut slopes = |denoiser: Option<&Denoiser>| {
                 let mut sum = 0.0;
                 for points in &tiles {

@@ -1,6 +1,6 @@
 //! Statistics of a tile beside its moments: misfits, mean values, residuals and slopes.
 
-use crate::tiles::denoising::TextureSpectrum;
+use crate::tiles::denoising::{TextureSpectrum, TileFrame};
 use crate::tiles::grid::{SIDE, TilePoints};
 use crate::tiles::residual_weighting::{Loss, NoiseHistogram, NoiseModel};
 use crate::tiles::tile_arrays::{INTERIOR, SAMPLES, ZERO_ROWS, squared_gradients, sum};
@@ -81,7 +81,7 @@ impl TileWorkspace {
             }
         }
         if !self.has_gaps {
-            spectrum.add(&mean, self.noise_gains());
+            spectrum.add(&mean, self.shares());
         }
         let gains: f32 = self.frames.iter().map(|frame| frame.gain.powi(2)).sum();
         let square_gain = gains / self.frames.len().max(1) as f32;
@@ -100,14 +100,14 @@ impl TileWorkspace {
         }
     }
 
-    /// Spacing of the samples `d = √q` in pixels, and noise gain `u = (q a)² / (Σ q a²)²`, of each
-    /// observer ([`crate::tiles::denoising`]).
-    fn noise_gains(&self) -> impl Iterator<Item = (f64, f64)> {
+    /// Values, gain and share of the weight of each observer ([`crate::tiles::denoising`]).
+    fn shares(&self) -> impl Iterator<Item = TileFrame<'_>> {
         let weight = |frame: &FrameValues| f64::from(frame.pixels * frame.gain * frame.gain);
         let total: f64 = self.frames.iter().map(weight).sum();
-        self.frames.iter().map(move |frame| {
-            let own = f64::from(frame.pixels * frame.gain) / total;
-            (f64::from(frame.pixels).sqrt(), own * own)
+        self.frames.iter().map(move |frame| TileFrame {
+            values: &frame.values,
+            gain: f64::from(frame.gain),
+            share: weight(frame) / total,
         })
     }
 }
