@@ -262,10 +262,8 @@ pub mod joint {
     pub const SAMPLES_PER_PIXEL: f64 = 3.0;
 }
 
-/// Thresholds of `solver/gauss_newton.rs, solve_record.rs`.
+/// Thresholds of `solver/gauss_newton.rs`.
 pub mod gauss_newton {
-    use std::ops::RangeInclusive;
-
     /// Share of the slope along a step, `δᵀ g`, that a step must remove if it does not lower the
     /// cost. Higher: fewer steps count as good. Chosen by: the strong Wolfe condition.
     pub const MIN_SLOPE_REDUCTION: f64 = 0.5;
@@ -273,9 +271,6 @@ pub mod gauss_newton {
     /// Chosen by: on sharp bricks the cost varies by up to 0.9 % while the whole survey moves along
     /// its gauge, which changes nothing.
     pub const MAX_COST_RISE: f64 = 0.01;
-    /// Plausible curvatures of a solve; others belong to solves that were still far from their end.
-    /// Wider: curvatures of such solves count, too. Chosen by: unknown.
-    pub const PLAUSIBLE_CURVATURES: RangeInclusive<f64> = 0.6..=1.2;
 }
 
 /// Thresholds of `solver/stopping.rs`.

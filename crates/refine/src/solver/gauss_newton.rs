@@ -310,7 +310,12 @@ impl DampedGaussNewton {
                 let is_whole = self.lambda == 0.0 && all_feasible;
                 let curvature = |before: f64, after: f64| (1.0 - after / before) / length;
                 let of_poses = |at| slots_slope(&step[..frames.len()], at, 6);
-                record.curvature = is_whole.then(|| curvature(of_poses(&current), of_poses(&next)));
+                record.curvature = all_feasible.then(|| {
+                    let before = of_poses(&current);
+                    let damped =
+                        self.lambda * damping_of_poses(&step[..frames.len()], problem, &current);
+                    curvature(before, of_poses(&next)) * before / (before + damped)
+                });
                 self.decrement = is_whole.then_some(decrement);
                 self.steps.push(record);
                 self.length = if is_whole && step_px < STEP_TOLERANCE_PX {
@@ -430,6 +435,18 @@ fn slots_slope(step: &[FrameStep], at: &Linearisation, unknowns: usize) -> f64 {
     let slopes =
         slots.map(|(step, gradient)| step.rows(0, unknowns).dot(&gradient.rows(0, unknowns)));
     slopes.sum()
+}
+
+/// What damping with λ = 1 adds to `δᵀHδ` of the poses: `δᵀ diag(H) δ`.
+fn damping_of_poses(step: &[FrameStep], problem: &PhotometricProblem, at: &Linearisation) -> f64 {
+    let of_slot = |(slot, step): (usize, &FrameStep)| {
+        let block = problem.pattern().block_index(slot, slot);
+        let diagonal = block.map(|index| at.normal.blocks[index].diagonal());
+        let diagonal = diagonal.unwrap_or_default();
+        let terms = step.iter().zip(diagonal.iter()).take(6);
+        terms.map(|(step, h)| step * step * h).sum::<f64>()
+    };
+    step.iter().enumerate().map(of_slot).sum()
 }
 
 /// The derivative of the cost along a whole step, that of the shared unknowns included.

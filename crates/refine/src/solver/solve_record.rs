@@ -1,7 +1,6 @@
 //! The course of a solve: its steps, costs, and the curvature that they show.
 
 use crate::solver::stopping::StopReason;
-use crate::thresholds::gauss_newton::PLAUSIBLE_CURVATURES;
 use serde::{Deserialize, Serialize};
 
 /// One step of a solve.
@@ -16,7 +15,8 @@ pub struct StepRecord {
     /// λ with which it was taken; 0 is plain Gauss–Newton.
     pub damping: f64,
     /// Change of the gradient along the step, over what the normal equations predict:
-    /// `δᵀ(g' − g)/δᵀHδ`, of the poses' part of the step δ. None where it was not looked at.
+    /// `δᵀ(g' − g)/δᵀHδ`, of the poses' part of the step δ. None where it was not looked at: after
+    /// a last step, and where frames were held.
     pub curvature: Option<f64>,
 }
 
@@ -45,25 +45,21 @@ pub struct SolveRecord {
 /// Curvature for Gaussian residuals and slopes without error: the mean of `ψ'` over that of `ω`
 /// with [`crate::tiles::residual_weighting::Loss`].
 const GAUSSIAN_CURVATURE: f64 = 0.89;
+/// Curvature of a solve whose last steps showed none: of that, σ are a thousand times those of a
+/// good solve, and nothing is believed.
+const NO_CURVATURE: f64 = 1e-3;
 
 impl SolveRecord {
-    /// Derivative of the gradient over the normal matrix: the mean over all steps that show it, by
-    /// the squares of their lengths ([`crate::uncertainty::covariance`]).
+    /// Derivative of the gradient over the normal matrix ([`crate::uncertainty::covariance`]), as
+    /// the last step showed that was looked at.
+    ///
+    /// It is 1 at the most: weights fall as residuals grow, `ψ' ≤ ω`. Where slopes are noise it is
+    /// much less, and a solve comes to an end in steps that hardly change the gradient.
     pub fn curvature(&self) -> f64 {
-        let steps = self.steps.iter().filter_map(|step| {
-            let curvature = step
-                .curvature
-                .filter(|of| PLAUSIBLE_CURVATURES.contains(of))?;
-            Some((step.step_px.powi(2), curvature))
-        });
-        let (weights, sum) = steps.fold((0.0, 0.0), |(weights, sum), (weight, curvature)| {
-            (weights + weight, sum + weight * curvature)
-        });
-        if weights > 0.0 {
-            sum / weights
-        } else {
-            GAUSSIAN_CURVATURE
-        }
+        let last = self.steps.iter().rev().find_map(|step| step.curvature);
+        let last = last.unwrap_or(GAUSSIAN_CURVATURE);
+        // NaN, too, is none.
+        last.min(1.0).max(NO_CURVATURE)
     }
 }
 
@@ -91,11 +87,16 @@ mod tests {
     }
 
     #[test]
-    fn long_steps_count_most_and_implausible_ones_not_at_all() {
-        let plausible = record(&[(0.2, Some(0.9)), (0.1, Some(0.8)), (0.05, None)]);
-        assert!((plausible.curvature() - (4.0 * 0.9 + 0.8) / 5.0).abs() < 1e-12);
-        let implausible = record(&[(3.0, Some(-0.4)), (1.0, Some(f64::NAN)), (0.1, None)]);
-        assert_eq!(implausible.curvature(), GAUSSIAN_CURVATURE);
+    fn the_last_step_that_was_looked_at_counts() {
+        assert_eq!(
+            record(&[(0.2, Some(0.9)), (0.1, Some(0.07)), (0.05, None)]).curvature(),
+            0.07
+        );
+        assert_eq!(record(&[(0.05, None)]).curvature(), GAUSSIAN_CURVATURE);
+        assert_eq!(record(&[(3.0, Some(1.4))]).curvature(), 1.0);
+        for none in [-0.4, f64::NAN] {
+            assert_eq!(record(&[(0.3, Some(none))]).curvature(), NO_CURVATURE);
+        }
     }
 
     /// Means over a Gaussian of unit variance.

@@ -194,15 +194,19 @@ impl SolutionUncertainty {
     }
 }
 
-/// The undamped step of all slots and of the shared parameters where the solve ended; `factor`: of
-/// the normal matrix there.
+/// The undamped step of all slots and of the shared parameters where the solve ended, with the
+/// curvature that it showed; `factor`: of the normal matrix there.
 fn step_left(
     solution: &Solution,
     factor: &Factor,
 ) -> Result<(Vec<FrameStep>, Kappa), ProblemError> {
     let problem = &solution.problem;
     let step = (solution.linearisation).step(factor, 0.0, problem.tested());
-    step.ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))
+    let (mut slots, shared) =
+        step.ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))?;
+    let length = solution.record.curvature().recip();
+    slots.iter_mut().for_each(|slot| *slot *= length);
+    Ok((slots, shared * length))
 }
 
 /// Of every frame, those that are compared and may see part of the same wall.
