@@ -15,8 +15,8 @@ pub struct StepRecord {
     /// λ with which it was taken; 0 is plain Gauss–Newton.
     pub damping: f64,
     /// Change of the gradient along the step, over what the normal equations predict:
-    /// `δᵀ(g' − g)/δᵀHδ`, of the poses' part of the step δ. None where it was not looked at: after
-    /// a last step, and where frames were held.
+    /// `δᵀ(g' − g)/δᵀHδ`, of the poses' part of the step δ. None of damped steps, and of a last step,
+    /// which is not judged.
     pub curvature: Option<f64>,
 }
 
@@ -28,6 +28,9 @@ pub struct SolveRecord {
     pub iterations: u64,
     /// The steps.
     pub steps: Vec<StepRecord>,
+    /// Curvature ([`StepRecord::curvature`]) along the last undamped step that was tried, taken or
+    /// not; None if none was.
+    pub curvature: Option<f64>,
     /// Robust cost at the start.
     pub cost_start: f64,
     /// Robust cost at the end, on the same wall samples, before the last step.
@@ -50,14 +53,13 @@ const GAUSSIAN_CURVATURE: f64 = 0.89;
 const NO_CURVATURE: f64 = 1e-3;
 
 impl SolveRecord {
-    /// Derivative of the gradient over the normal matrix ([`crate::uncertainty::covariance`]), as
-    /// the last step showed that was looked at.
+    /// Derivative of the gradient over the normal matrix ([`crate::uncertainty::covariance`]) where
+    /// the solve ended, as its last undamped step showed.
     ///
     /// It is 1 at the most: weights fall as residuals grow, `ψ' ≤ ω`. Where slopes are noise it is
     /// much less, and a solve comes to an end in steps that hardly change the gradient.
     pub fn curvature(&self) -> f64 {
-        let last = self.steps.iter().rev().find_map(|step| step.curvature);
-        let last = last.unwrap_or(GAUSSIAN_CURVATURE);
+        let last = self.curvature.unwrap_or(GAUSSIAN_CURVATURE);
         // NaN, too, is none.
         last.min(1.0).max(NO_CURVATURE)
     }
@@ -67,16 +69,11 @@ impl SolveRecord {
 mod tests {
     use super::*;
 
-    fn record(steps: &[(f64, Option<f64>)]) -> SolveRecord {
-        let steps = steps.iter().map(|(step_px, curvature)| StepRecord {
-            cost: None,
-            step_px: *step_px,
-            damping: 0.0,
-            curvature: *curvature,
-        });
+    fn record(curvature: Option<f64>) -> SolveRecord {
         SolveRecord {
             iterations: 0,
-            steps: steps.collect(),
+            steps: Vec::new(),
+            curvature,
             cost_start: 0.0,
             cost_end: 0.0,
             observations: 0,
@@ -87,16 +84,15 @@ mod tests {
     }
 
     #[test]
-    fn the_last_step_that_was_looked_at_counts() {
+    fn curvature_is_positive_and_one_at_the_most() {
+        let curvature = |last| record(last).curvature();
+        assert_eq!(curvature(Some(0.07)), 0.07);
+        assert_eq!(curvature(Some(1.4)), 1.0);
+        assert_eq!(curvature(None), GAUSSIAN_CURVATURE);
         assert_eq!(
-            record(&[(0.2, Some(0.9)), (0.1, Some(0.07)), (0.05, None)]).curvature(),
-            0.07
+            [-0.4, f64::NAN].map(|last| curvature(Some(last))),
+            [NO_CURVATURE; 2]
         );
-        assert_eq!(record(&[(0.05, None)]).curvature(), GAUSSIAN_CURVATURE);
-        assert_eq!(record(&[(3.0, Some(1.4))]).curvature(), 1.0);
-        for none in [-0.4, f64::NAN] {
-            assert_eq!(record(&[(0.3, Some(none))]).curvature(), NO_CURVATURE);
-        }
     }
 
     /// Means over a Gaussian of unit variance.
