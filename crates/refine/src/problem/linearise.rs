@@ -83,7 +83,7 @@ impl PhotometricProblem<'_> {
     }
 
     /// A linearisation without any terms.
-    pub(super) fn zero_linearisation(&self) -> Linearisation {
+    pub fn zero_linearisation(&self) -> Linearisation {
         let border = self
             .estimates_shared
             .then(|| SharedBorder::zeros(self.pattern.columns()));

@@ -344,7 +344,7 @@ impl<'a> PhotometricProblem<'a> {
 
     /// Information of a pixel's grey value: the inverse of the variance of unit weight times the
     /// dispersion.
-    pub(super) fn information(&self) -> f64 {
+    pub fn information(&self) -> f64 {
         1.0 / (self.unit_variance * self.context.dispersion)
     }
 

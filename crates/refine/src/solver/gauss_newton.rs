@@ -3,7 +3,6 @@
 //! This is the iteration itself, as plain code; [`crate::solver::argmin_glue`] hands it to
 //! argmin's executor, which counts iterations and shows progress.
 
-use crate::linear::normal_equations::Pattern;
 use crate::linear::sparse_cholesky::FactorError;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
@@ -77,7 +76,6 @@ pub struct SolveState {
     lambda: f64,
     length: f64,
     decrement: Option<f64>,
-    curvature: Option<f64>,
     cost_start: f64,
     steps: Vec<StepRecord>,
     /// The unknowns from whose equations those at `unknowns` were updated, and the n of the share,
@@ -112,8 +110,6 @@ pub struct DampedGaussNewton {
     length: f64,
     /// Decrement `δᵀHδ` of the step before, if it was undamped and no frame was held.
     decrement: Option<f64>,
-    /// Curvature along the last undamped step that was tried, taken or not.
-    curvature: Option<f64>,
     /// Cost and equations at the present unknowns; None before the first linearisation.
     current: Option<Linearisation>,
     /// The unknowns at which `current` is.
@@ -133,7 +129,6 @@ impl DampedGaussNewton {
             lambda: 0.0,
             length: 1.0,
             decrement: None,
-            curvature: None,
             current: None,
             linearised_at: Unknowns::default(),
             updated_from: None,
@@ -157,7 +152,6 @@ impl DampedGaussNewton {
             lambda: state.lambda,
             length: state.length,
             decrement: state.decrement,
-            curvature: state.curvature,
             cost_start: Some(state.cost_start),
             steps: state.steps.clone(),
             updated_from: state.updated_from.clone(),
@@ -173,7 +167,6 @@ impl DampedGaussNewton {
             lambda: self.lambda,
             length: self.length,
             decrement: self.decrement,
-            curvature: self.curvature,
             cost_start: self.cost_start.unwrap_or_default(),
             steps: self.steps.clone(),
             updated_from: self.updated_from.clone(),
@@ -224,7 +217,6 @@ impl DampedGaussNewton {
             iterations: self.steps.len() as u64,
             last_step_px: self.steps.last().map_or(0.0, |step| step.step_px),
             steps: self.steps,
-            curvature: self.curvature,
             cost_start: self.cost_start.unwrap_or_default(),
             cost_end: linearisation.cost,
             observations: linearisation.frames.iter().map(|f| f.samples).sum(),
@@ -308,11 +300,6 @@ impl DampedGaussNewton {
                 }
                 None => problem.linearise_at(&candidate)?,
             };
-            let curvature = (self.lambda == 0.0).then(|| {
-                let whole = (step.as_slice(), &shared);
-                curvature_along(whole, problem.pattern(), frames.len(), (&current, &next))
-            });
-            self.curvature = curvature.or(self.curvature);
             let left = slope(&step, &shared, &next);
             let settles = step_px < problem.pixel_px()
                 && left.abs() < (1.0 - MIN_SLOPE_REDUCTION) * decrement
@@ -321,12 +308,13 @@ impl DampedGaussNewton {
                 record.cost = Some(next.cost);
                 // An undamped step is δ = −α H⁻¹ g, with its length α.
                 let is_whole = self.lambda == 0.0 && all_feasible;
-                let curvature_left = |left: f64| (1.0 + left / decrement) / length;
-                record.curvature = curvature;
+                let curvature = |before: f64, after: f64| (1.0 - after / before) / length;
+                let of_poses = |at| slots_slope(&step[..frames.len()], at, 6);
+                record.curvature = is_whole.then(|| curvature(of_poses(&current), of_poses(&next)));
                 self.decrement = is_whole.then_some(decrement);
                 self.steps.push(record);
                 self.length = if is_whole && step_px < STEP_TOLERANCE_PX {
-                    next_length(curvature_left(left))
+                    next_length(curvature(-decrement, left))
                 } else {
                     1.0
                 };
@@ -437,32 +425,18 @@ fn hold_infeasible_frames(
 }
 
 /// The derivative of the cost along the first `unknowns` of the step of each slot: `δᵀ g`.
-fn slots_slope(step: &[FrameStep], gradient: &[FrameStep], unknowns: usize) -> f64 {
-    let slots = step.iter().zip(gradient);
+fn slots_slope(step: &[FrameStep], at: &Linearisation, unknowns: usize) -> f64 {
+    let slots = step.iter().zip(&at.normal.gradient);
     let slopes =
         slots.map(|(step, gradient)| step.rows(0, unknowns).dot(&gradient.rows(0, unknowns)));
     slopes.sum()
-}
-
-/// Change of the gradient of the poses of `frames` frames along a step, over what the equations
-/// before it predict.
-fn curvature_along(
-    step: (&[FrameStep], &Kappa),
-    pattern: &Pattern,
-    frames: usize,
-    (before, after): (&Linearisation, &Linearisation),
-) -> f64 {
-    let (_, predicted, _) = before.predict(pattern, step);
-    let poses = &step.0[..frames];
-    let along = |gradient: &[FrameStep]| slots_slope(poses, gradient, 6);
-    (along(&after.normal.gradient) - along(&before.normal.gradient)) / along(&predicted)
 }
 
 /// The derivative of the cost along a whole step, that of the shared unknowns included.
 fn slope(step: &[FrameStep], shared: &Kappa, at: &Linearisation) -> f64 {
     let border = at.border.as_ref();
     let of_shared = border.map_or(0.0, |border| shared.dot(&border.gradient));
-    slots_slope(step, &at.normal.gradient, FRAME_PARAMETERS) + of_shared
+    slots_slope(step, at, FRAME_PARAMETERS) + of_shared
 }
 
 #[cfg(test)]

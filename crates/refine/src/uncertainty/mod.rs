@@ -1,8 +1,8 @@
 //! The stated uncertainty, and tests of the model that it rests on.
 //!
 //! ```text
-//! covariance, frame_sigma ──→ overdispersion ─┐
-//! observability ──────────────────────────────┴→ solution_uncertainty
+//! observed_curvature → covariance, frame_sigma → overdispersion ─┐
+//! observability ─────────────────────────────────────────────────┴→ solution_uncertainty
 //! observability → calibration_report, rolling_shutter_test
 //! ```
 //!
@@ -20,6 +20,7 @@ pub mod frame_sigma;
 pub mod masked_report;
 pub mod model_error;
 pub mod observability;
+pub mod observed_curvature;
 pub mod overdispersion;
 pub mod pixel_jacobians;
 pub mod registration_sigma;

@@ -101,13 +101,14 @@ pub struct ErrorDraws {
 impl EstimateErrors {
     /// Finds the size of patches over which errors go together, and draws the errors that they and
     /// the prior make in the poses; those of the prior alone if the dispersion of single blocks is
-    /// the largest. None if the prior leaves a pose free. `factor`: of the normal matrix.
+    /// the largest. None if the prior leaves a pose free. At the end of the solve: the `factor` of
+    /// the normal matrix, and the `curvature` κ.
     ///
     /// # Errors
     /// [`ProblemError`]: a frame that cannot be read, a singular normal matrix.
     pub fn find(
         solution: &Solution,
-        factor: &Factor,
+        (factor, curvature): (&Factor, f64),
         posterior: Option<&Posterior>,
         of_noise: &NoiseCovariance,
         alpha: f64,
@@ -123,7 +124,6 @@ impl EstimateErrors {
         let Some(prior) = PriorRoot::of(pattern, &prior) else {
             return Ok(None);
         };
-        let curvature = solution.record.curvature();
         let draw = |scores: &PatchScores, posterior, curvature| {
             let system = System {
                 factor,

@@ -44,11 +44,16 @@ pub struct Posterior {
 }
 
 impl Posterior {
-    /// Eliminates the poses at a solution; None if no shared parameter was estimated.
+    /// Eliminates the poses at a solution with the `curvature` κ
+    /// ([`crate::uncertainty::observed_curvature`]); None if no shared parameter was estimated.
     ///
     /// # Errors
     /// [`FactorError`] if the poses' normal matrix is singular.
-    pub fn at(solution: &Solution, scatter: &ScoreScatter) -> Result<Option<Self>, FactorError> {
+    pub fn at(
+        solution: &Solution,
+        scatter: &ScoreScatter,
+        curvature: f64,
+    ) -> Result<Option<Self>, FactorError> {
         let (problem, at) = (&solution.problem, &solution.linearisation);
         let (Some(border), Some(border_scatter)) = (&at.border, &scatter.border) else {
             return Ok(None);
@@ -59,7 +64,7 @@ impl Posterior {
         let (prior, prior_border) = problem.other_information(&solution.unknowns);
         let scatter = (reduce_to_shared(pattern, &scatter.blocks, border_scatter, &w)
             + reduce_to_shared(pattern, &prior, &prior_border, &w))
-            / solution.record.curvature().powi(2);
+            / curvature.powi(2);
         Ok(Some(Self { w, schur, scatter }))
     }
 

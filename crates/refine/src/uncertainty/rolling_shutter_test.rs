@@ -22,6 +22,7 @@ use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
 use crate::thresholds::rolling_shutter_test::MIN_DIFFERENCE_SIGMA;
 use crate::uncertainty::observability::Posterior;
+use crate::uncertainty::observed_curvature::observe_curvature;
 use nalgebra::Vector3;
 use serde::Serialize;
 use tunnelstitch_core::survey::{CalibrateSection, CalibrationGroup};
@@ -87,8 +88,16 @@ pub fn estimate_readout(
         Err(ProblemError::Factor { .. }) => return Ok(None),
         Err(error) => return Err(error),
     };
-    let scatter = solution.problem.score_scatter(&solution.linearisation);
-    let Ok(Some(posterior)) = Posterior::at(&solution, &scatter) else {
+    let (problem, at) = (&solution.problem, &solution.linearisation);
+    let factor = problem
+        .symbolic()
+        .factorise(problem.pattern(), &at.normal, 0.0);
+    let Ok(factor) = factor else {
+        return Ok(None);
+    };
+    let curvature = observe_curvature(&solution, &factor)?;
+    let Ok(Some(posterior)) = Posterior::at(&solution, &problem.score_scatter(at), curvature)
+    else {
         return Ok(None);
     };
     let Some(covariance) = posterior.covariance(&calibration.free) else {

@@ -16,6 +16,7 @@ use crate::uncertainty::covariance::{Covariances, compute_covariances};
 use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma_by};
 use crate::uncertainty::model_error::{EstimateErrors, ModelErrorReport};
 use crate::uncertainty::observability::{Posterior, UnobservableParameter};
+use crate::uncertainty::observed_curvature::observe_curvature;
 use crate::uncertainty::overdispersion::{Overdispersion, compute_overdispersions};
 use crate::uncertainty::pixel_jacobians::{PointJacobians, pixel_jacobians};
 use crate::uncertainty::registration_sigma::registration_sigmas;
@@ -57,7 +58,14 @@ impl SolutionUncertainty {
         let problem = &solution.problem;
         let frames = solution.unknowns.frames.len();
         let scatter = problem.score_scatter(&solution.linearisation);
-        let posterior = Posterior::at(solution, &scatter);
+        let normal = &solution.linearisation.normal;
+        let factor = problem.symbolic().factorise(problem.pattern(), normal, 0.0);
+        let curvature = match &factor {
+            Ok(factor) => observe_curvature(solution, factor)?,
+            // Nothing is known of the poses then.
+            Err(_) => 1.0,
+        };
+        let posterior = Posterior::at(solution, &scatter, curvature);
         let posterior = posterior.map_err(|source| problem.factor_error(source))?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
@@ -69,16 +77,15 @@ impl SolutionUncertainty {
             problem.constrained_gauge_freedoms(),
             &scatter.blocks,
             &prior,
-            solution.record.curvature(),
+            curvature,
         );
         // Poses without a covariance still count; they are reported as uncertain.
         let total = match of_noise {
             Ok(of_noise) => {
-                let normal = &solution.linearisation.normal;
-                let factor = problem.symbolic().factorise(problem.pattern(), normal, 0.0);
                 let factor = factor.map_err(|source| problem.factor_error(source))?;
                 let posterior = posterior.as_ref();
-                let errors = EstimateErrors::find(solution, &factor, posterior, &of_noise, alpha)?;
+                let at_end = (&factor, curvature);
+                let errors = EstimateErrors::find(solution, at_end, posterior, &of_noise, alpha)?;
                 if let (Some(shared), Some(errors)) = (&mut shared, &errors) {
                     *shared += errors.draws.of_shared();
                 }
@@ -92,7 +99,7 @@ impl SolutionUncertainty {
                     of_noise,
                     errors,
                     unseen: unseen.clone(),
-                    left: step_left(solution, &factor)?,
+                    left: step_left(solution, &factor, curvature)?,
                     shared: of_shared.map(|(posterior, shared)| (posterior.w.clone(), shared)),
                 })
             }
@@ -195,18 +202,18 @@ impl SolutionUncertainty {
 }
 
 /// The undamped step of all slots and of the shared parameters where the solve ended, with the
-/// curvature that it showed; `factor`: of the normal matrix there.
+/// curvature there; `factor`: of the normal matrix.
 fn step_left(
     solution: &Solution,
     factor: &Factor,
+    curvature: f64,
 ) -> Result<(Vec<FrameStep>, Kappa), ProblemError> {
     let problem = &solution.problem;
     let step = (solution.linearisation).step(factor, 0.0, problem.tested());
     let (mut slots, shared) =
         step.ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))?;
-    let length = solution.record.curvature().recip();
-    slots.iter_mut().for_each(|slot| *slot *= length);
-    Ok((slots, shared * length))
+    slots.iter_mut().for_each(|slot| *slot /= curvature);
+    Ok((slots, shared / curvature))
 }
 
 /// Of every frame, those that are compared and may see part of the same wall.
