@@ -19,10 +19,11 @@ use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
 };
 use crate::follow::PREVIEW_FILES;
+use crate::persist::shard_number::ShardNumber;
 use crate::progress::Progress;
 use crate::refine::{
-    FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, ShardNumber,
-    WallPoints, check_input, search_readings,
+    FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, WallPoints,
+    check_input, search_readings,
 };
 use crate::survey::{CalibrationGroup, Survey};
 use std::path::PathBuf;
