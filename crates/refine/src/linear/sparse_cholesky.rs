@@ -81,6 +81,19 @@ impl SymbolicFactorisation {
         normal: &NormalEquations,
         lambda: f64,
     ) -> Result<Factor<'_>, FactorError> {
+        self.factorise_with(pattern, normal, |_, own| own * (1.0 + lambda))
+    }
+
+    /// Factorises H with another diagonal: `diagonal_of` every slot and element of H there.
+    ///
+    /// # Errors
+    /// [`FactorError::NotPositiveDefinite`].
+    pub fn factorise_with(
+        &self,
+        pattern: &Pattern,
+        normal: &NormalEquations,
+        diagonal_of: impl Fn(usize, f64) -> f64,
+    ) -> Result<Factor<'_>, FactorError> {
         let mut values = Vec::with_capacity(self.structure.row_idx().len());
         for column in 0..pattern.columns() {
             // The blocks of a column follow each other, the one on the diagonal last.
@@ -95,7 +108,7 @@ impl SymbolicFactorisation {
                 }
                 let own = &normal.blocks[diagonal];
                 values.extend_from_slice(&own.column(c).as_slice()[..c]);
-                values.push(own[(c, c)] * (1.0 + lambda));
+                values.push(diagonal_of(column, own[(c, c)]));
             }
         }
         let matrix = SparseColMatRef::new(self.structure.as_ref(), &values);
