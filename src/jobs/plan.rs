@@ -126,7 +126,7 @@ fn section_tasks(
         source,
     })?;
     let inputs = inputs_of(&survey, folder)?;
-    let work = SectionWork::of(&survey, options.division.shards(&survey));
+    let work = SectionWork::of(&survey, options.division.shards(&survey), options.cores);
     let is_refined = options.steps.contains(&SectionStep::Refine);
     let calls = SectionCalls {
         id: &section.id,

@@ -2,7 +2,9 @@
 
 use super::job::{Needs, SectionStep};
 use super::section_calls::Part;
-use crate::check::{Effort, JOIN_SHARE, join_bytes, refine_processor_s, shard_bytes, shard_share};
+use crate::check::{
+    Effort, JOIN_SHARE, join_bytes, refine_bytes, refine_processor_s, shard_bytes, shard_share,
+};
 use crate::refine::RefineOptions;
 use crate::render::native_px_per_metre;
 use crate::survey::Survey;
@@ -46,8 +48,9 @@ pub struct SectionWork {
 }
 
 impl SectionWork {
-    /// The work of a survey in so many shards.
-    pub fn of(survey: &Survey, shards: usize) -> Self {
+    /// The work of a survey in so many shards, each task on so many processors.
+    pub fn of(survey: &Survey, shards: usize, cores: u16) -> Self {
+        let threads = usize::from(cores);
         let surface = survey.surface.as_ref();
         // Cameras that show no wall make no panorama: refining says so.
         let px_per_metre = native_px_per_metre(surface, &survey.cameras, &survey.initial_poses());
@@ -56,7 +59,7 @@ impl SectionWork {
         Self {
             refine_s: refine_processor_s(survey, &RefineOptions::default()),
             refine_bytes: match shards {
-                1 => effort.refine_bytes,
+                1 => refine_bytes(survey, threads),
                 _ => join_bytes(survey),
             },
             shards,
@@ -64,7 +67,7 @@ impl SectionWork {
                 1 => [0.0, 1.0],
                 _ => [shard_share(survey, shards), JOIN_SHARE],
             },
-            shard_bytes: shard_bytes(survey, shards),
+            shard_bytes: shard_bytes(survey, shards, threads),
             panorama_px: width as f64 * height as f64,
         }
     }

@@ -348,10 +348,11 @@ fn conclude(
 impl RefineArguments {
     /// Memory of the run, bytes.
     fn memory_bytes(&self, survey: &Survey) -> u64 {
+        let threads = rayon::current_num_threads();
         match (self.shard, &self.join) {
-            (Some(ShardNumber { of, .. }), _) => shard_bytes(survey, of),
+            (Some(ShardNumber { of, .. }), _) => shard_bytes(survey, of, threads),
             (None, Some(_)) => join_bytes(survey),
-            (None, None) => refine_bytes(survey),
+            (None, None) => refine_bytes(survey, threads),
         }
     }
 
