@@ -23,10 +23,12 @@ const JOINT_FACTOR: f64 = 15.0;
 pub const JOIN_SHARE: f64 = 0.3;
 /// Memory of a frame's pyramid per pixel, bytes.
 const PYRAMID_BYTES_PER_PIXEL: f64 = 6.0;
-/// Memory of the normal equations per frame while the strengths of the wall's shape are learned,
-/// bytes: that of poses, shape and their factors on two cores. Measured on surveys of 200 to 1,200
-/// frames of 320 × 240 px with twelve a turn.
-const SHAPE_BYTES_PER_FRAME: f64 = 0.9e6;
+/// Memory of the normal equations per frame, bytes: those of poses and of the wall's shape.
+/// Measured on stretches of 680 to 1,660 frames of 320 × 240 px with twelve a turn.
+const SHAPE_BYTES_PER_FRAME: f64 = 0.1e6;
+/// Memory of a factor of them per frame, bytes; every thread has one while the strengths of the
+/// shape are learned. Measured likewise, on one and two threads.
+const FACTOR_BYTES_PER_FRAME: f64 = 0.3e6;
 /// Memory of the normal equations per frame of the last solve and the assessment, bytes, where the
 /// wall has no shape. Measured likewise.
 const EQUATION_BYTES_PER_FRAME: f64 = 0.2e6;
@@ -56,7 +58,7 @@ impl Effort {
         let px = |metres: f64| (metres * px_per_metre).max(0.0) as u64;
         Self {
             refine_s: refine_s(survey, &RefineOptions::default()),
-            refine_bytes: refine_bytes(survey),
+            refine_bytes: refine_bytes(survey, rayon::current_num_threads()),
             panorama_px: [
                 px(survey.surface.perimeter_m()),
                 px(to_m - from_m + frame_m),
@@ -96,15 +98,17 @@ fn focal_registrations(survey: &Survey, options: &RefineOptions) -> f64 {
     }
 }
 
-/// Memory of refine, bytes, beside what the program takes for any survey.
-pub fn refine_bytes(survey: &Survey) -> u64 {
-    let memory = (RefineOptions::default().cache_bytes, SHAPE_BYTES_PER_FRAME);
+/// Memory of refine on so many threads, bytes, beside what the program takes for any survey.
+pub fn refine_bytes(survey: &Survey, threads: usize) -> u64 {
+    let cache_bytes = RefineOptions::default().cache_bytes;
+    let memory = (cache_bytes, shape_bytes_per_frame(threads));
     bytes_of_frames(survey, survey.frames.len(), memory)
 }
 
-/// Memory of refining one of so many shards, bytes, beside what the program takes for any survey.
-pub fn shard_bytes(survey: &Survey, shards: usize) -> u64 {
-    let memory = (SHARD_CACHE_BYTES, SHAPE_BYTES_PER_FRAME);
+/// Memory of refining one of so many shards on so many threads, bytes, beside what the program
+/// takes for any survey.
+pub fn shard_bytes(survey: &Survey, shards: usize, threads: usize) -> u64 {
+    let memory = (SHARD_CACHE_BYTES, shape_bytes_per_frame(threads));
     bytes_of_frames(survey, shard_frames(survey, shards), memory)
 }
 
@@ -112,6 +116,11 @@ pub fn shard_bytes(survey: &Survey, shards: usize) -> u64 {
 pub fn join_bytes(survey: &Survey) -> u64 {
     let memory = (SHARD_CACHE_BYTES, EQUATION_BYTES_PER_FRAME);
     bytes_of_frames(survey, survey.frames.len(), memory)
+}
+
+/// Memory of the equations per frame where the wall has a shape, bytes.
+fn shape_bytes_per_frame(threads: usize) -> f64 {
+    SHAPE_BYTES_PER_FRAME + threads as f64 * FACTOR_BYTES_PER_FRAME
 }
 
 /// Processor time of refining one of so many shards over that of refining the survey.

@@ -12,7 +12,8 @@
 //! | sections, their surveys, and where they lie on the map | `network`: [`Network`] |
 //! | the graph and its file | [`Job`] |
 //! | its folder, on this machine or on storage | [`JobFolder`] |
-//! | its tasks, with needs and expectations | [`plan()`] |
+//! | its tasks | [`plan()`] |
+//! | their calls, needs and expectations | `section_calls`, `section_work` |
 //! | hash by which a task is done or not | `task_key` |
 //! | record of a task that is done | [`TaskRecord`] |
 //! | how the last attempt of a task ended | [`TaskState`] |
@@ -29,6 +30,8 @@ mod process;
 mod run_job;
 mod run_task;
 mod schedule;
+mod section_calls;
+mod section_work;
 mod task_key;
 mod task_record;
 mod task_state;

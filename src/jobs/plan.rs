@@ -1,35 +1,17 @@
 //! The tasks of a network: their commands, files, needs and expectations.
 
 use super::error::JobError;
-use super::job::{Job, Needs, SectionStep, Step, Task, TriggerRule};
+use super::job::{Job, SectionStep, Step, Task, TriggerRule};
 use super::network::{Network, Section, SectionLine};
-use crate::check::{Effort, JOIN_SHARE, join_bytes, refine_processor_s, shard_bytes, shard_share};
+use super::section_calls::{Call, Part, SectionCalls};
+use super::section_work::{SectionWork, needs};
 use crate::files::printed;
 use crate::inspect::MARKS_GEOJSON;
-use crate::refine::{RefineOptions, ShardNumber};
-use crate::render::native_px_per_metre;
 use crate::storage::Mirror;
 use crate::survey::{Survey, toml_path};
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf, absolute};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-
-/// Processor time of a pixel of a panorama, seconds, with its share of decoding and writing.
-/// Measured on surveys of 320 × 240 to 640 × 480 px on a cloud machine.
-const TIME_PER_PANORAMA_PIXEL_S: f64 = 0.1e-6;
-/// Panoramas that a report compares: of initial and of refined poses.
-const PANORAMAS_OF_REPORT: f64 = 2.0;
-/// Processor time of starting the program, seconds.
-const START_S: f64 = 1.0;
-/// Memory of the program beside what it works on, bytes.
-const PROGRAM_BYTES: u64 = 192 << 20;
-/// Memory for parts of a panorama and pictures of frames, bytes.
-const PANORAMA_BYTES: u64 = 512 << 20;
-/// Times that a task may take as long as expected, which is right within a factor of three or so,
-/// before it is ended.
-const LIMIT_FACTOR: f64 = 40.0;
-/// Least time before a task is ended, seconds.
-const MIN_LIMIT_S: f64 = 600.0;
 
 /// Time for the map of a network: a process and the figures of a section, seconds.
 const TIME_PER_SECTION_S: f64 = 0.1;
@@ -45,11 +27,11 @@ pub struct PlanOptions {
     pub steps: BTreeSet<SectionStep>,
     /// Processors of a task.
     pub cores: u16,
-    /// Shards in which each section is refined.
+    /// Shards in which each section is refined and stitched.
     pub division: Division,
 }
 
-/// Shards in which a section is refined.
+/// Shards in which a section is refined and stitched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Division {
     /// So many, or fewer if it has not as many frames.
@@ -144,191 +126,47 @@ fn section_tasks(
         source,
     })?;
     let inputs = inputs_of(&survey, folder)?;
-    let work = Work::of(&survey, options.division.shards(&survey));
+    let work = SectionWork::of(&survey, options.division.shards(&survey), options.cores);
     let is_refined = options.steps.contains(&SectionStep::Refine);
-    let call = Call {
+    let calls = SectionCalls {
         id: &section.id,
         survey: from_folder(&section.survey, folder)?,
         is_refined,
         shards: work.shards,
     };
-    let task = |id: String, step: SectionStep, (command, output): (Vec<String>, String)| Task {
-        id,
-        section: section.id.clone(),
-        step: step.into(),
-        command,
-        inputs: inputs.clone(),
-        outputs: vec![output.into()],
-        after: Vec::new(),
-        trigger_rule: TriggerRule::AllSuccess,
-        needs: work.needs(step, options.cores),
-    };
     let refine = format!("{}.{}", section.id, Step::Refine);
-    let mut tasks = Vec::new();
-    if is_refined && work.shards > 1 {
-        tasks.extend((1..=work.shards).map(|number| Task {
-            needs: work.needs_of_shard(options.cores),
-            ..task(
-                format!("{refine}-{number}"),
-                SectionStep::Refine,
-                call.shard(number),
-            )
-        }));
-    }
-    let shards: Vec<String> = tasks.iter().map(|task| task.id.clone()).collect();
-    tasks.extend(options.steps.iter().map(|step| Task {
-        after: match step {
-            SectionStep::Refine => shards.clone(),
-            _ if is_refined => vec![refine.clone()],
-            _ => Vec::new(),
-        },
-        ..task(
-            format!("{}.{}", section.id, Step::from(*step)),
-            *step,
-            call.command_and_output(*step),
-        )
-    }));
-    Ok(tasks)
-}
-
-/// The commands of a section.
-struct Call<'s> {
-    /// The section.
-    id: &'s str,
-    /// Its survey, from the folder of the job.
-    survey: PathBuf,
-    /// True if its poses are refined.
-    is_refined: bool,
-    /// Shards in which they are.
-    shards: usize,
-}
-
-impl Call<'_> {
-    /// The command of a step, and its output.
-    fn command_and_output(&self, step: SectionStep) -> (Vec<String>, String) {
-        let Self { id, .. } = self;
-        let survey = self.survey.to_string_lossy();
-        let refined = format!("{id}/refined");
-        let poses = format!("{refined}/poses.tum");
-        let with_poses = match self.is_refined {
-            true => vec!["--poses", poses.as_str()],
-            false => Vec::new(),
-        };
-        let shards = self.shards_folder();
-        let joined = match self.shards {
-            1 => Vec::new(),
-            _ => vec!["--join", shards.as_str()],
-        };
-        let (options, flag, output) = match step {
-            SectionStep::Refine => (joined, "--out", refined.clone()),
-            SectionStep::Stitch => (with_poses, "--out", format!("{id}/panorama.tif")),
-            SectionStep::Report => (
-                vec!["--refined", refined.as_str()],
-                "--out",
-                format!("{id}/report"),
-            ),
-            SectionStep::Export => (with_poses, "--3dtiles", format!("{id}/tiles")),
-        };
-        let words = options.into_iter().chain([flag, output.as_str()]);
-        (command(step, &survey, words), output)
-    }
-
-    /// The command of a shard of the refinement, and its output.
-    fn shard(&self, number: usize) -> (Vec<String>, String) {
-        let folder = self.shards_folder();
-        let shard = ShardNumber {
-            number,
-            of: self.shards,
-        };
-        let output = shard.file(Path::new(&folder));
-        let shard = shard.to_string();
-        let words = ["--shard", shard.as_str(), "--out", folder.as_str()];
-        let survey = self.survey.to_string_lossy();
-        let output = output.to_string_lossy().into_owned();
-        (command(SectionStep::Refine, &survey, words), output)
-    }
-
-    /// Folder of the shards, from that of the job.
-    fn shards_folder(&self) -> String {
-        format!("{}/shards", self.id)
-    }
-}
-
-/// A command on a survey.
-fn command<'w>(
-    step: SectionStep,
-    survey: &'w str,
-    words: impl IntoIterator<Item = &'w str>,
-) -> Vec<String> {
-    let name = Step::from(step).to_string();
-    let first = ["tunnelstitch", name.as_str(), survey];
-    let all = first.into_iter().map(str::to_owned);
-    all.chain(words.into_iter().map(str::to_owned)).collect()
-}
-
-/// The work of a section.
-struct Work {
-    /// Processor time of refining, seconds.
-    refine_s: f64,
-    /// Memory of refining, or of joining shards, bytes.
-    refine_bytes: u64,
-    /// Number of shards.
-    shards: usize,
-    /// Share of the processor time of refining that a shard takes, and one that joins them.
-    shares: [f64; 2],
-    /// Memory of refining a shard, bytes.
-    shard_bytes: u64,
-    /// Pixels of the panorama at the frames' resolution.
-    panorama_px: f64,
-}
-
-impl Work {
-    fn of(survey: &Survey, shards: usize) -> Self {
-        let surface = survey.surface.as_ref();
-        // Cameras that show no wall make no panorama: refining says so.
-        let px_per_metre = native_px_per_metre(surface, &survey.cameras, &survey.initial_poses());
-        let effort = Effort::of(survey, px_per_metre.unwrap_or_default());
-        let [width, height] = effort.panorama_px;
-        Self {
-            refine_s: refine_processor_s(survey, &RefineOptions::default()),
-            refine_bytes: match shards {
-                1 => effort.refine_bytes,
-                _ => join_bytes(survey),
-            },
-            shards,
-            shares: match shards {
-                1 => [0.0, 1.0],
-                _ => [shard_share(survey, shards), JOIN_SHARE],
-            },
-            shard_bytes: shard_bytes(survey, shards),
-            panorama_px: width as f64 * height as f64,
+    let mut tasks: Vec<Task> = Vec::new();
+    for step in &options.steps {
+        let is_after_refine = is_refined && *step != SectionStep::Refine;
+        let first = tasks.len();
+        for Call {
+            part,
+            command,
+            output,
+        } in calls.of_step(*step)
+        {
+            // Each part after those before it that it reads, the whole after all of them.
+            let earlier = tasks[first..].iter();
+            let earlier = earlier.filter(|_| part == Part::Whole);
+            let seams = tasks
+                .get(first)
+                .filter(|_| *step == SectionStep::Stitch && matches!(part, Part::Shard(_)));
+            let after = earlier.chain(seams).map(|task| task.id.clone());
+            let refined = is_after_refine.then(|| refine.clone());
+            tasks.push(Task {
+                id: format!("{}.{}{}", section.id, Step::from(*step), part.suffix()),
+                section: section.id.clone(),
+                step: (*step).into(),
+                command,
+                inputs: inputs.clone(),
+                outputs: vec![output.into()],
+                after: refined.into_iter().chain(after).collect(),
+                trigger_rule: TriggerRule::AllSuccess,
+                needs: work.needs(*step, part, options.cores),
+            });
         }
     }
-
-    fn needs(&self, step: SectionStep, cores: u16) -> Needs {
-        let panorama_s = TIME_PER_PANORAMA_PIXEL_S * self.panorama_px;
-        let (processor_s, bytes) = match step {
-            SectionStep::Refine => (self.shares[1] * self.refine_s, self.refine_bytes),
-            SectionStep::Stitch | SectionStep::Export => (panorama_s, PANORAMA_BYTES),
-            SectionStep::Report => (PANORAMAS_OF_REPORT * panorama_s, PANORAMA_BYTES),
-        };
-        needs(processor_s, bytes, cores)
-    }
-
-    fn needs_of_shard(&self, cores: u16) -> Needs {
-        needs(self.shares[0] * self.refine_s, self.shard_bytes, cores)
-    }
-}
-
-/// Needs of a task of this processor time (seconds), and this memory beside that of the program.
-fn needs(processor_s: f64, bytes: u64, cores: u16) -> Needs {
-    let seconds = START_S + processor_s / f64::from(cores);
-    Needs {
-        cores,
-        memory_bytes: PROGRAM_BYTES + bytes,
-        seconds,
-        limit_seconds: (LIMIT_FACTOR * seconds).max(MIN_LIMIT_S),
-    }
+    Ok(tasks)
 }
 
 /// The files of a survey, and the folders of its frames, from the folder of the job.
@@ -469,7 +307,7 @@ mod tests {
             plan(&network, &dir.path().join("job"), &options).unwrap()
         };
         let job = plan(Division::FramesPerShard(1));
-        let [first, second, join, stitch] = &job.tasks[..] else {
+        let [first, second, join, seams, draw, other, stitch] = &job.tasks[..] else {
             panic!("{job:?}");
         };
         assert_eq!(
@@ -482,7 +320,33 @@ mod tests {
             "tunnelstitch refine ../K1 --join K1/shards --out K1/refined"
         );
         assert_eq!(join.after, [first.id.as_str(), second.id.as_str()]);
-        assert_eq!(stitch.after, ["K1.refine"]);
+        assert_eq!(seams.after, ["K1.refine"]);
+        assert_eq!(
+            seams.command.join(" "),
+            "tunnelstitch stitch ../K1 --poses K1/refined/poses.tum --seams --out \
+             K1/panorama-shards"
+        );
+        assert_eq!(seams.outputs, [Path::new("K1/panorama-shards/seams.state")]);
+        assert_eq!(other.id, "K1.stitch-2");
+        assert_eq!(other.after, ["K1.refine", "K1.stitch-seams"]);
+        assert_eq!(
+            other.command.join(" "),
+            "tunnelstitch stitch ../K1 --poses K1/refined/poses.tum --shard 2/2 --out \
+             K1/panorama-shards"
+        );
+        assert_eq!(
+            other.outputs,
+            [Path::new("K1/panorama-shards/shard-2-of-2")]
+        );
+        assert_eq!(
+            stitch.command.join(" "),
+            "tunnelstitch stitch ../K1 --poses K1/refined/poses.tum --join K1/panorama-shards \
+             --out K1/panorama.tif"
+        );
+        assert_eq!(
+            stitch.after,
+            ["K1.refine", seams.id.as_str(), &draw.id, &other.id]
+        );
         // No more shards than frames, and one is none.
         assert_eq!(plan(Division::Shards(9)), job);
         assert_eq!(plan(Division::FramesPerShard(2)).tasks.len(), 2);

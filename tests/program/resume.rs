@@ -148,6 +148,37 @@ fn stitch_ends_with_the_same_bytes_however_often_it_is_killed() {
     }
 }
 
+/// A shard of a panorama, and what joins all of them.
+#[test]
+fn a_panorama_in_shards_has_the_same_bytes_however_often_its_tasks_are_killed() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = survey(dir.path(), 48, "128x96");
+    let [plain, joined, parts] = ["plain", "joined", "parts"].map(|name| dir.path().join(name));
+    let stitch = |words: &[&str], out: &Path| -> Vec<String> {
+        let first = ["stitch", text(&survey), "--px-per-metre", "250"];
+        let words = [&first[..], words, &["--out", text(out)]].concat();
+        words.into_iter().map(str::to_owned).collect()
+    };
+    fn words(words: &[String]) -> Vec<&str> {
+        words.iter().map(String::as_str).collect()
+    }
+    let start = Instant::now();
+    succeed(&words(&stitch(&[], &plain.join("wall.tif"))));
+    let takes = start.elapsed();
+    succeed(&words(&stitch(&["--seams"], &parts)));
+    succeed(&words(&stitch(&["--shard", "2/2"], &parts)));
+    killed(&words(&stitch(&["--shard", "1/2"], &parts)), takes / 2, 5);
+    let join = stitch(&["--join", text(&parts)], &joined.join("wall.tif"));
+    succeed(&words(&join));
+    // A run of it has its command line.
+    for folder in [&plain, &joined] {
+        std::fs::remove_file(folder.join("wall.tif.run.toml")).unwrap();
+    }
+    assert_same(&plain, &joined);
+    let left = std::fs::read_dir(&parts).unwrap().count();
+    assert_eq!(left, 3);
+}
+
 /// Waits until the run has kept a state.
 fn wait_for_a_state(child: &mut Child, folder: &Path) {
     let has_state = || {

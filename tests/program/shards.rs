@@ -82,7 +82,15 @@ fn a_job_of_shards_has_the_same_bytes_in_any_order_and_the_poses_of_a_single_run
     succeed(&["run-job", text(&forth)]);
     let early = fail(&["run-task", text(&back), "s.refine"], 75);
     assert!(early.contains("comes after s.refine-1"), "{early}");
-    for task in ["s.refine-2", "s.refine-1", "s.refine", "s.stitch"] {
+    for task in [
+        "s.refine-2",
+        "s.refine-1",
+        "s.refine",
+        "s.stitch-seams",
+        "s.stitch-2",
+        "s.stitch-1",
+        "s.stitch",
+    ] {
         succeed(&["run-task", text(&back), task]);
     }
     // survey.toml names the frames as the folder of the job sees them.
@@ -93,7 +101,12 @@ fn a_job_of_shards_has_the_same_bytes_in_any_order_and_the_poses_of_a_single_run
     };
     assert_eq!(results(&forth), results(&back));
     let panorama = |job: &Path| std::fs::read(job.join("s/panorama.tif")).unwrap();
-    assert_eq!(panorama(&forth), panorama(&back));
+    assert!(panorama(&forth) == panorama(&back));
+    // It is the panorama that is drawn as a whole.
+    let (poses, whole) = (forth.join("s/refined/poses.tum"), dir.path().join("w.tif"));
+    let files = ["--poses", text(&poses), "--out", text(&whole)];
+    succeed(&[&["stitch", text(&survey)], &files[..]].concat());
+    assert!(panorama(&forth) == std::fs::read(&whole).unwrap());
     assert_near(&dir.path().join("plain"), &forth.join("s/refined"));
 }
 
@@ -132,4 +145,89 @@ fn shards_that_do_not_belong_together_are_refused() {
     ];
     let message = fail(&none, 3);
     assert!(message.contains("there is no shard 1 of 9"), "{message}");
+}
+
+/// Runs `stitch` on a survey, with `words` and the output `out`.
+fn stitch(survey: &Path, words: &[&str], out: &Path) {
+    let out = ["--px-per-metre", "160", "--out", text(out)];
+    succeed(&[&["stitch", text(survey)], words, &out[..]].concat());
+}
+
+/// Maps, lossy tiles, and more shards than bands.
+#[test]
+fn a_panorama_in_shards_has_the_files_of_a_whole_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("s");
+    support::simulate(&survey, &["--frames", "20", "--size", "96x72"]);
+    for (name, more, shards) in [
+        ("maps", &["--maps"][..], 3),
+        ("jpeg", &["--compression", "jpeg", "--quality", "80"], 9),
+    ] {
+        let folder = dir.path().join(name);
+        let [parts, whole, joined] = ["parts", "whole", "joined"].map(|name| folder.join(name));
+        let with_maps = |of: &Path| -> Vec<String> {
+            let mut words: Vec<String> = more.iter().map(|word| (*word).to_owned()).collect();
+            if name == "maps" {
+                words.push(text(&of.join("maps")).to_owned());
+            }
+            words
+        };
+        let run = |of: &Path, words: &[&str], out: &Path| {
+            let maps = with_maps(of);
+            let maps: Vec<&str> = maps.iter().map(String::as_str).collect();
+            stitch(&survey, &[&maps[..], words].concat(), out);
+        };
+        run(&whole, &[], &whole.join("wall.tif"));
+        run(&joined, &["--seams"], &parts);
+        for number in (1..=shards).rev() {
+            run(&joined, &["--shard", &format!("{number}/{shards}")], &parts);
+        }
+        run(&joined, &["--join", text(&parts)], &joined.join("wall.tif"));
+        let results = |folder: &Path| {
+            let mut files = outputs(folder);
+            // It has the command line.
+            files.remove(Path::new("wall.tif.run.toml"));
+            files
+        };
+        assert!(results(&whole).len() >= if name == "maps" { 6 } else { 1 });
+        assert!(results(&whole) == results(&joined), "{name}");
+    }
+}
+
+#[test]
+fn parts_of_another_panorama_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("s");
+    support::simulate(&survey, &["--frames", "4", "--size", "96x72"]);
+    let [parts, out] = ["parts", "out.tif"].map(|name| dir.path().join(name));
+    let call = |words: &[&'static str], out: &Path, code: i32| {
+        let out = ["--out", text(out)];
+        fail(
+            &[&["stitch", text(&survey)], words, &out[..]].concat(),
+            code,
+        )
+    };
+    let parts_text: &'static str = Box::leak(text(&parts).to_owned().into_boxed_str());
+    let message = call(&["--shard", "1/2"], &parts, 3);
+    assert!(message.contains("seams.state"), "{message}");
+    let words = ["stitch", text(&survey), "--out", text(&parts)];
+    succeed(&[&words[..], &["--seams"]].concat());
+    let message = call(&["--shard", "1/2", "--px-per-metre", "50"], &parts, 3);
+    assert!(message.contains("its options differ"), "{message}");
+    for shard in ["1/2", "2/2"] {
+        succeed(&[&words[..], &["--shard", shard]].concat());
+    }
+    let join = ["--join", parts_text];
+    let message = call(&join, &dir.path().join("out.png"), 2);
+    assert!(message.contains(".tif"), "{message}");
+    let tiles = parts.join("shard-2-of-2/panorama");
+    let mut bytes = std::fs::read(&tiles).unwrap();
+    bytes[9] ^= 1;
+    std::fs::write(&tiles, bytes).unwrap();
+    let message = call(&join, &out, 3);
+    assert!(message.contains("hash does not match"), "{message}");
+    std::fs::remove_dir_all(parts.join("shard-2-of-2")).unwrap();
+    let message = call(&join, &out, 3);
+    assert!(message.contains("shard-2-of-2"), "{message}");
+    assert!(!out.exists());
 }

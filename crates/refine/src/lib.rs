@@ -104,7 +104,6 @@ pub use report::{
 pub use shards::division::{SHARD_CACHE_BYTES, Shard};
 pub use shards::join_shards::join_shards;
 pub use shards::refine_shard::refine_shard;
-pub use shards::shard_number::ShardNumber;
 pub use shards::state::ShardState;
 pub use solver::solve_record::{SolveRecord, StepRecord};
 pub use solver::stopping::StopReason;

@@ -72,7 +72,8 @@ pub use output::maps::Map;
 pub use output::memory::available_bytes;
 pub use output::panorama::Panorama;
 pub use output::panorama_files::{
-    CheckpointedFiles, DeformationAt, MaskedAt, PanoramaFileOptions, PanoramaFiles, WallProperties,
+    CheckpointedFiles, DeformationAt, MaskedAt, PanoramaFileOptions, PanoramaFiles, PanoramaPart,
+    WallProperties,
 };
 pub use output::panorama_progress::{PanoramaJob, PanoramaProgress};
 pub use output::plan::{Plan, Settled};

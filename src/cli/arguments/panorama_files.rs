@@ -17,7 +17,7 @@ use std::path::PathBuf;
 pub struct OutputArguments {
     /// The panorama. The extension chooses the format: .tif is a Cloud-Optimised GeoTIFF of any
     /// length, in metres; .png and .jpg are held in memory. A .jpg is black where no frame sees the
-    /// wall.
+    /// wall. With --seams and --shard, the folder of the parts.
     #[arg(long, short, value_name = "FILE")]
     pub out: PathBuf,
     /// Also write a Deep Zoom picture for viewers in a browser. FILE must end in .dzi; its tiles
@@ -81,6 +81,31 @@ impl OutputArguments {
             atomic::check_folder(folder)?;
         }
         Ok(())
+    }
+
+    /// Checks the folder into which parts of a panorama are written.
+    ///
+    /// # Errors
+    /// A file of that name; a folder that cannot be created.
+    pub fn check_folder_of_parts(&self) -> Result<(), Failure> {
+        Ok(atomic::check_folder(&self.out)?)
+    }
+
+    /// Checks names as [`OutputArguments::check_names`] does, of a panorama that is put together
+    /// from parts: a GeoTIFF.
+    ///
+    /// # Errors
+    /// Those of [`OutputArguments::check_names`]; another format.
+    pub fn check_name_of_tiff(&self) -> Result<(), Failure> {
+        self.check_names()?;
+        if self.options().is_tiff() {
+            return Ok(());
+        }
+        Err(Failure::usage(format!(
+            "--out {}: with --join the name must end in .tif; a picture of another format is drawn \
+             as a whole",
+            printed(&self.out)
+        )))
     }
 
     /// Refuses outputs that would replace one another or a file of the survey.

@@ -29,4 +29,8 @@ pub mod run_task;
 pub mod shell;
 pub mod simulate;
 pub mod stitch;
+pub mod stitch_maps;
+pub mod stitch_run;
+pub mod stitch_shards;
+pub mod stitch_summary;
 pub mod view;

@@ -45,13 +45,13 @@ pub struct PlanJobArguments {
         value_parser = clap::value_parser!(u16).range(1..=1024)
     )]
     cores: u16,
-    /// Refine each section in N shards along the tunnel, tasks of their own that need less memory,
-    /// and join them. Poses differ by a fraction of their 1-σ from those without shards, as those
-    /// of a survey that begins elsewhere do.
+    /// Refine and stitch each section in N shards along the tunnel, tasks of their own that need
+    /// less memory, and join them. Poses differ by a fraction of their 1-σ from those without
+    /// shards, as those of a survey that begins elsewhere do; panoramas of the same poses do not.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     shards: Option<u32>,
-    /// Refine each section in as many shards as it takes for no more than M frames of its own in
-    /// each.
+    /// Refine and stitch each section in as many shards as it takes for no more than M frames of
+    /// its own in each.
     #[arg(
         long,
         value_name = "M",

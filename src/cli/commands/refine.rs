@@ -19,10 +19,11 @@ use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
 };
 use crate::follow::PREVIEW_FILES;
+use crate::persist::shard_number::ShardNumber;
 use crate::progress::Progress;
 use crate::refine::{
-    FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, ShardNumber,
-    WallPoints, check_input, search_readings,
+    FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, WallPoints,
+    check_input, search_readings,
 };
 use crate::survey::{CalibrationGroup, Survey};
 use std::path::PathBuf;
@@ -347,10 +348,11 @@ fn conclude(
 impl RefineArguments {
     /// Memory of the run, bytes.
     fn memory_bytes(&self, survey: &Survey) -> u64 {
+        let threads = rayon::current_num_threads();
         match (self.shard, &self.join) {
-            (Some(ShardNumber { of, .. }), _) => shard_bytes(survey, of),
+            (Some(ShardNumber { of, .. }), _) => shard_bytes(survey, of, threads),
             (None, Some(_)) => join_bytes(survey),
-            (None, None) => refine_bytes(survey),
+            (None, None) => refine_bytes(survey, threads),
         }
     }
 

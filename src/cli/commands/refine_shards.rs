@@ -4,13 +4,11 @@ use crate::cli::output::{Failure, Terminal};
 use crate::files::printed;
 use crate::persist::checkpoint::{Checkpoint, Origin};
 use crate::persist::part_file::{read_part, write_part};
+use crate::persist::shard_number::ShardNumber;
 use crate::progress::Progress;
-use crate::refine::{
-    RefineInput, RefineOptions, ShardNumber, ShardState, WallPoints, refine_shard,
-};
+use crate::refine::{RefineInput, RefineOptions, ShardState, WallPoints, refine_shard};
 use crate::survey::Survey;
 use serde::Serialize;
-use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -65,26 +63,24 @@ pub fn write_shard(
 /// A folder without shards, or with those of several divisions; one that is missing, damaged or of
 /// another survey.
 pub fn read_shards(folder: &Path, origin: &Origin) -> Result<Vec<ShardState>, Failure> {
-    let entries = std::fs::read_dir(folder).and_then(Iterator::collect::<Result<Vec<_>, _>>);
-    let entries =
-        entries.map_err(|error| Failure::input(format!("--join {}: {error}", printed(folder))))?;
-    let paths = entries.iter().map(std::fs::DirEntry::path);
-    let found: BTreeSet<ShardNumber> = paths
-        .filter_map(|path| ShardNumber::of_file(&path))
-        .collect();
-    let divisions: BTreeSet<usize> = found.iter().map(|shard| shard.of).collect();
-    let mut divisions = divisions.into_iter();
-    let (Some(of), None) = (divisions.next(), divisions.next()) else {
-        return Err(Failure::input(format!(
-            "--join {}: there must be the files of all shards of one division, as \
-             {}.state, and nothing of another one",
-            printed(folder),
-            ShardNumber { number: 1, of: 8 }.name()
-        )));
-    };
-    let shards = (1..=of).map(|number| {
-        let file = ShardNumber { number, of }.file(folder);
-        read_part(&file, origin).map_err(|error| Failure::input(error.to_string()))
+    let shards = shards_in(folder)?.into_iter().map(|shard| {
+        let part = read_part(&shard.file(folder), origin);
+        part.map_err(|error| Failure::input(error.to_string()))
     });
     shards.collect()
+}
+
+/// The shards of the division that `--join` finds in a folder, in order.
+///
+/// # Errors
+/// A folder without shards, or with those of several divisions.
+pub fn shards_in(folder: &Path) -> Result<Vec<ShardNumber>, Failure> {
+    let fail = |what: &str| Failure::input(format!("--join {}: {what}", printed(folder)));
+    let shards = ShardNumber::all_in(folder).map_err(|error| fail(&error.to_string()))?;
+    shards.ok_or_else(|| {
+        fail(
+            "there must be what all shards of one division wrote, as shard-1-of-8, and nothing of \
+             another one",
+        )
+    })
 }

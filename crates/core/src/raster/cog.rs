@@ -146,9 +146,42 @@ impl CogWriter {
     /// [`RasterError::Tile`] for one outside the picture, a duplicate or one of the wrong size; an
     /// error of the operating system.
     pub fn add(&mut self, batch: Vec<RasterTile>) -> Result<(), RasterError> {
+        let complete = self.pyramid.add(batch)?;
+        self.store(&complete)
+    }
+
+    /// Takes over the tiles of another writer of a part of the same picture: its state, and its
+    /// file of compressed tiles, which is left as it is. Overviews of tiles of both are completed,
+    /// so that the file does not depend on how the picture was divided.
+    ///
+    /// # Errors
+    /// [`RasterError::Tile`] for a tile that is there already; [`RasterError::Unsupported`] for the
+    /// state of another picture; an error of the operating system.
+    pub fn absorb(&mut self, part: CogState, tiles: &Path) -> Result<(), RasterError> {
+        let fail = |source| WriteError::new(tiles, source);
+        let sizes =
+            |stored: &[Vec<Option<Stored>>]| stored.iter().map(Vec::len).collect::<Vec<_>>();
+        if sizes(&self.stored) != sizes(&part.stored) {
+            return Err(RasterError::Unsupported("a part of another picture"));
+        }
+        let complete = self.pyramid.absorb(part.waiting.into_owned())?;
+        let mut spool = Spool::of_part(tiles)?;
+        let mut packed = Packed::default();
+        for (own, part) in self.stored.iter_mut().zip(part.stored.iter()) {
+            for (own, part) in own.iter_mut().zip(part) {
+                if let Some(stored) = part {
+                    spool.read(stored, &mut packed).map_err(fail)?;
+                    *own = Some(self.spool.append(&packed).map_err(fail)?);
+                }
+            }
+        }
+        self.store(&complete)
+    }
+
+    /// Compresses complete tiles and appends them to the spool.
+    fn store(&mut self, complete: &[LevelTile]) -> Result<(), RasterError> {
         let fail = |source| WriteError::new(&self.target, source);
         let (spec, compression) = (self.spec, self.compression);
-        let complete = self.pyramid.add(batch)?;
         let packed: Vec<Packed> = complete
             .par_map(|tile| compression.pack(&spec, tile))
             .into_iter()

@@ -85,6 +85,76 @@ impl OverviewBuilder {
         Ok(complete)
     }
 
+    /// Takes over what has arrived at a builder of the same picture, whose complete tiles of all
+    /// levels are stored elsewhere; returns the overview tiles that become complete.
+    ///
+    /// # Errors
+    /// [`RasterError::Tile`] for a tile that has arrived at both.
+    pub(super) fn absorb(&mut self, part: Waiting) -> Result<Vec<LevelTile>, RasterError> {
+        let [columns, _] = self.spec.grid(0).map(|count| count as usize);
+        for (place, arrived) in part
+            .arrived
+            .iter()
+            .enumerate()
+            .filter(|(_, arrived)| **arrived)
+        {
+            if std::mem::replace(&mut self.waiting.arrived[place], *arrived) {
+                return Err(RasterError::Tile {
+                    column: (place % columns) as u32,
+                    row: (place / columns) as u32,
+                    what: "it came twice",
+                });
+            }
+        }
+        let mut parts: Vec<_> = part.pending.into_iter().collect();
+        parts.sort_by_key(|(key, _)| *key);
+        let mut parts = parts.into_iter().peekable();
+        let (mut complete, mut tiles) = (Vec::new(), Vec::new());
+        for level in 1..self.levels {
+            let mut above = Vec::new();
+            while let Some((key, part)) = parts.next_if(|((of, ..), _)| *of == level) {
+                above.extend(self.unite(key, part));
+            }
+            above.extend(self.reduce_into(level, &tiles));
+            complete.extend(tiles.into_iter().map(|tile| LevelTile {
+                level: level - 1,
+                tile,
+            }));
+            tiles = above;
+        }
+        let level = self.levels - 1;
+        complete.extend(tiles.into_iter().map(|tile| LevelTile { level, tile }));
+        Ok(complete)
+    }
+
+    /// Adds an incomplete overview tile of another builder to the own one; returns it if it becomes
+    /// complete. Pixels that are missing are zero.
+    fn unite(&mut self, key: (usize, u32, u32), part: Pending) -> Option<RasterTile> {
+        let (level, column, row) = key;
+        let all = parts(&self.spec, level, column, row);
+        let united = match self.waiting.pending.remove(&key) {
+            None => part,
+            Some(mut own) => {
+                for (own, part) in own.pixels.iter_mut().zip(&part.pixels) {
+                    *own |= part;
+                }
+                // Of those that one lacks the other has the rest.
+                own.missing = (own.missing + part.missing).saturating_sub(all);
+                own
+            }
+        };
+        if united.missing > 0 {
+            self.waiting.pending.insert(key, united);
+            return None;
+        }
+        let pixels = united.pixels;
+        Some(RasterTile {
+            column,
+            row,
+            pixels,
+        })
+    }
+
     /// Marks a tile of full resolution as arrived.
     fn take(&mut self, tile: &RasterTile) -> Result<(), RasterError> {
         let &RasterTile { column, row, .. } = tile;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
-use tunnelstitch_geometry::files::open_without_links;
+use tunnelstitch_geometry::files::{open_regular, open_without_links};
 
 /// A file of compressed tiles in the order of their arrival.
 pub(super) struct Spool {
@@ -57,6 +57,16 @@ impl Spool {
         Ok(Self {
             file,
             end,
+            _folder: None,
+        })
+    }
+
+    /// Opens the spool file `path` of another writer, to read from it.
+    pub(super) fn of_part(path: &Path) -> Result<Self, WriteError> {
+        let file = open_regular(path).map_err(|source| WriteError::new(path, source))?;
+        Ok(Self {
+            file,
+            end: 0,
             _folder: None,
         })
     }

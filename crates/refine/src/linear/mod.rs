@@ -20,4 +20,4 @@ pub mod normal_equations;
 pub mod selected_inverse;
 pub mod sparse_cholesky;
 #[cfg(test)]
-mod test_dense;
+pub mod test_dense;

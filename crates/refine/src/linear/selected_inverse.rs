@@ -86,15 +86,17 @@ impl SelectedInverse {
             rows,
         };
         for j in (0..count).rev() {
+            // Each column of L gives its memory to that of the inverse.
+            let factor = std::mem::take(&mut factor[j]);
             let column: Vec<Block> = inverse.rows[j]
                 .iter()
                 .map(|&i| {
-                    let sum = inverse.rows[j].iter().zip(&factor[j]);
+                    let sum = inverse.rows[j].iter().zip(&factor);
                     sum.map(|(&k, l)| inverse.block_at(i, k).unwrap_or_default() * l)
                         .fold(Block::zeros(), |sum, term| sum - term)
                 })
                 .collect();
-            for (l, z) in factor[j].iter().zip(&column) {
+            for (l, z) in factor.iter().zip(&column) {
                 inverse.diagonal[j] -= l.transpose() * z;
             }
             inverse.below[j] = column;

@@ -15,7 +15,7 @@
 //!
 //! | step | file |
 //! | --- | --- |
-//! | stretches of a survey | [`division`], [`shard_number`] |
+//! | stretches of a survey | [`division`] |
 //! | the input of a stretch, and its run | [`refine_shard`] |
 //! | what a stretch hands over | [`state`] |
 //! | motion and exposure of one stretch against the one before | [`alignment`] |
@@ -32,5 +32,4 @@ pub mod joined_shape;
 pub mod joined_unknowns;
 pub mod joined_unseen;
 pub mod refine_shard;
-pub mod shard_number;
 pub mod state;

@@ -34,7 +34,7 @@
 //! Communications in Statistics 19(2), 1990.
 
 use crate::linear::bordered_system::{SchurComplement, SharedBlock, SharedBorder};
-use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
+use crate::linear::normal_equations::{NormalEquations, Pattern};
 use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
 use crate::model::significance::normal_quantile;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
@@ -65,7 +65,7 @@ const MAX_STEP_FACTOR: f64 = 30.0;
 /// A shape with learned strengths, and the minimum of the quadratic cost with these.
 pub struct LearnedShape<'s> {
     equations: ShapeEquations<'s>,
-    minimum: Minimum<'s>,
+    minimum: Minimum,
     sigmas_m: Vec<f64>,
     dropped: Vec<bool>,
 }
@@ -122,9 +122,9 @@ pub struct ShapeEquations<'s> {
     pub first_slot: usize,
 }
 
-/// The minimum of the quadratic cost for some strengths.
-struct Minimum<'f> {
-    factor: Factor<'f>,
+/// The minimum of the quadratic cost for some strengths. The factor of the normal matrix is not
+/// kept: it takes most of the memory.
+struct Minimum {
     /// Elimination of the slots from the border, if there is one.
     schur: Option<SchurComplement>,
     /// Step of all slots to it.
@@ -135,20 +135,21 @@ struct Minimum<'f> {
     log_evidence: f64,
 }
 
-impl Minimum<'_> {
+impl Minimum {
     /// Step of slots and shared parameters that a gradient of the slots makes, with the shared
-    /// parameters `held` known.
+    /// parameters `held` known; `factor`: of the normal matrix for the strengths.
     fn response(
         &self,
+        factor: &Factor,
         gradient: &[FrameStep],
         held: &[bool; SHARED_PARAMETERS],
     ) -> Option<(Vec<FrameStep>, Kappa)> {
         match &self.schur {
             Some(schur) => {
-                let step = schur.step(&self.factor, gradient, &Kappa::zeros())?;
+                let step = schur.step(factor, gradient, &Kappa::zeros())?;
                 schur.step_holding(step, &held.map(|held| held.then_some(0.0)))
             }
-            None => Some((self.factor.step(gradient), Kappa::zeros())),
+            None => Some((factor.step(gradient), Kappa::zeros())),
         }
     }
 }
@@ -202,12 +203,29 @@ impl<'s> ShapeEquations<'s> {
         }
     }
 
+    /// The factor of the normal matrix for the strengths `sigmas_m`; None if it is singular.
+    fn factor(&self, sigmas_m: &[f64]) -> Option<Factor<'s>> {
+        let mut changes = vec![0.0; self.pattern.columns()];
+        let scales = self.shape.model.scales.iter().zip(sigmas_m);
+        for ((scale, sigma_m), slots) in scales.zip(self.slots()) {
+            changes[slots].fill(sigma_m.powi(-2) - scale.sigma_m.powi(-2));
+        }
+        let diagonal = |slot: usize, own: f64| own + changes[slot];
+        let factor = (self.symbolic).factorise_with(self.pattern, self.normal, diagonal);
+        factor.ok()
+    }
+
     /// The minimum for the strengths `sigmas_m`; None if the equations are singular.
-    fn minimum(&self, sigmas_m: &[f64]) -> Option<Minimum<'s>> {
-        let mut normal = self.normal.clone();
+    fn minimum(&self, sigmas_m: &[f64]) -> Option<Minimum> {
+        self.minimum_by(&self.factor(sigmas_m)?, sigmas_m)
+    }
+
+    /// The minimum for the strengths `sigmas_m` by the factor for these.
+    fn minimum_by(&self, factor: &Factor, sigmas_m: &[f64]) -> Option<Minimum> {
+        let mut gradient = self.normal.gradient.clone();
         let mut shared_gradient = self.border.map_or(Kappa::zeros(), |border| border.gradient);
         if self.is_minimum {
-            normal.gradient.fill(FrameStep::zeros());
+            gradient.fill(FrameStep::zeros());
             shared_gradient.fill(0.0);
         }
         let (mut prior_cost, mut log_volume) = (0.0, 0.0);
@@ -218,19 +236,17 @@ impl<'s> ShapeEquations<'s> {
             log_volume += (slots.len() * FRAME_PARAMETERS) as f64 * sigma_m.ln();
             for slot in slots {
                 let coefficients = &self.shape.coefficients[slot - self.first_slot];
-                normal.add_block(self.pattern, slot, slot, &(Block::identity() * change));
-                normal.gradient[slot] += coefficients * change;
+                gradient[slot] += coefficients * change;
                 prior_cost += 0.5 * information * coefficients.norm_squared();
             }
         }
-        let factor = self.symbolic.factorise(self.pattern, &normal, 0.0).ok()?;
-        let eliminated = self.border.map(|border| border.eliminate(&factor, 0.0));
+        let eliminated = self.border.map(|border| border.eliminate(factor, 0.0));
         let mut log_determinant = factor.log_determinant();
         let (step, shared) = match &eliminated {
-            Some(schur) => schur.step(&factor, &normal.gradient, &shared_gradient)?,
-            None => (factor.step(&normal.gradient), Kappa::zeros()),
+            Some(schur) => schur.step(factor, &gradient, &shared_gradient)?,
+            None => (factor.step(&gradient), Kappa::zeros()),
         };
-        let slopes = step.iter().zip(&normal.gradient);
+        let slopes = step.iter().zip(&gradient);
         let mut slope: f64 = slopes.map(|(step, gradient)| step.dot(gradient)).sum();
         if let Some(schur) = &eliminated {
             slope += shared.dot(&shared_gradient);
@@ -238,7 +254,6 @@ impl<'s> ShapeEquations<'s> {
             log_determinant += 2.0 * l.diagonal().iter().map(|d| d.ln()).sum::<f64>();
         }
         Some(Minimum {
-            factor,
             schur: eliminated,
             step,
             shared,
@@ -248,14 +263,10 @@ impl<'s> ShapeEquations<'s> {
 
     /// Goes to the strengths of the largest evidence up to `most_m`, but for those of `dropped`
     /// scales, and returns the minimum there.
-    fn fixed_point(
-        &self,
-        sigmas_m: &mut [f64],
-        most_m: f64,
-        dropped: &[bool],
-    ) -> Option<Minimum<'s>> {
-        let mut minimum = self.minimum(sigmas_m)?;
+    fn fixed_point(&self, sigmas_m: &mut [f64], most_m: f64, dropped: &[bool]) -> Option<Minimum> {
         for _ in 0..MAX_STEPS {
+            let factor = self.factor(sigmas_m)?;
+            let minimum = self.minimum_by(&factor, sigmas_m)?;
             let mut largest_change = 0.0f64;
             for (k, slots) in self.slots().enumerate() {
                 if dropped[k] {
@@ -263,7 +274,7 @@ impl<'s> ShapeEquations<'s> {
                 }
                 let functions = &self.shape.model.scales[k].functions;
                 let n = functions.deformations() as f64;
-                let trace = self.trace(&minimum, &slots, functions)?;
+                let trace = self.trace((&factor, &minimum), &slots, functions)?;
                 let determined = n - trace / sigmas_m[k].powi(2);
                 let coefficient = |slot: usize| {
                     let before = &self.shape.coefficients[slot - self.first_slot];
@@ -281,23 +292,27 @@ impl<'s> ShapeEquations<'s> {
                 largest_change = largest_change.max((next_m / sigmas_m[k]).ln().abs());
                 sigmas_m[k] = next_m;
             }
-            minimum = self.minimum(sigmas_m)?;
             if largest_change < CONVERGED {
                 break;
             }
         }
-        Some(minimum)
+        self.minimum(sigmas_m)
     }
 
     /// `tr(P A⁻¹ P)` over some slots, P the projection [`Functions::retain_deformation`].
-    fn trace(&self, minimum: &Minimum, slots: &Range<usize>, functions: &Functions) -> Option<f64> {
+    fn trace(
+        &self,
+        (factor, minimum): (&Factor, &Minimum),
+        slots: &Range<usize>,
+        functions: &Functions,
+    ) -> Option<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(slots.start as u64);
         let mut z = vec![SMatrix::<f64, FRAME_PARAMETERS, PROBES>::zeros(); self.pattern.columns()];
         for block in &mut z[slots.clone()] {
             *block = SMatrix::from_fn(|_, _| if rng.random() { 1.0 } else { -1.0 });
         }
         functions.retain_deformation(&mut z[slots.clone()]);
-        let solved = minimum.factor.solve(&z);
+        let solved = factor.solve(&z);
         let products = z.iter().zip(&solved);
         let mut trace: f64 = products.map(|(z, s)| z.component_mul(s).sum()).sum();
         if let Some(SchurComplement { w, schur }) = &minimum.schur {
@@ -374,6 +389,9 @@ impl LearnedShape<'_> {
         if dropped.is_empty() {
             return UnseenErrors::default();
         }
+        let Some(factor) = equations.factor(&self.sigmas_m) else {
+            return UnseenErrors::default();
+        };
         let slots: Vec<Range<usize>> = equations.slots().collect();
         let draws = (0..UNSEEN_DRAWS).par_map(|draw| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -387,7 +405,7 @@ impl LearnedShape<'_> {
                     gradient[slot] *= amplitude;
                 }
             }
-            let (step, shared) = self.minimum.response(&gradient, held)?;
+            let (step, shared) = self.minimum.response(&factor, &gradient, held)?;
             let (frames, shape) = step.split_at(equations.first_slot);
             Some(UnseenError {
                 frames: frames.to_vec(),
@@ -408,11 +426,12 @@ impl LearnedShape<'_> {
     /// Number of coefficients that the data determine, without mean, cos θ and sin θ of sections.
     pub fn determined(&self) -> Option<f64> {
         let equations = &self.equations;
+        let factor = equations.factor(&self.sigmas_m)?;
         let mut determined = 0.0;
         for (k, slots) in equations.slots().enumerate() {
             if !self.dropped[k] {
                 let functions = &equations.shape.model.scales[k].functions;
-                let trace = equations.trace(&self.minimum, &slots, functions)?;
+                let trace = equations.trace((&factor, &self.minimum), &slots, functions)?;
                 determined += functions.deformations() as f64 - trace / self.sigmas_m[k].powi(2);
             }
         }
@@ -443,6 +462,7 @@ impl LearnedShape<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linear::normal_equations::Block;
     use tunnelstitch_geometry::surface::WallPoint;
 
     /// Every coefficient is observed with an error of 1 mm; those of one lattice are 5 mm, all

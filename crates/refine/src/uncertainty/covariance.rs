@@ -46,15 +46,11 @@
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
 use crate::linear::sparse_cholesky::FactorError;
-use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+use crate::parameters::frame_estimate::FRAME_PARAMETERS;
+use crate::uncertainty::exposure_equations::{ExposurePattern, POSE};
 use crate::uncertainty::frame_sigma::FrameSigma;
 use nalgebra::{Matrix6, Vector6};
 use tunnelstitch_geometry::surface::GaugeMotion;
-
-/// Unknowns of a frame's pose.
-const POSE: usize = 6;
-/// Unknowns of a frame's exposure.
-const EXPOSURE: usize = FRAME_PARAMETERS - POSE;
 
 /// Covariances of the poses' steps `ξ = (ω, ρ)`
 /// ([`tunnelstitch_geometry::trajectory::Pose::retract`]): rad², rad·m, m².
@@ -172,16 +168,13 @@ pub fn compute_covariances(
     prior: &[Block],
     curvature: f64,
 ) -> Result<NoiseCovariance, FactorError> {
+    let of_exposures = traces_of_exposures(pattern, frames, normal, [scatter, prior])?;
     let inverse = SelectedInverse::new(pattern, normal)?;
-    let of_exposures = SelectedInverse::new(pattern, &exposures_alone(pattern, frames, normal))?;
-    let trace = |of: &[Block]| {
-        let exposures = exposures_parts(pattern, frames, of);
-        trace_of_product(pattern, &inverse, of)
-            - trace_of_product(pattern, &of_exposures, &exposures)
-    };
+    let [of_scatter, of_prior] = [scatter, prior].map(|of| trace_of_product(pattern, &inverse, of));
     let of_shape = (pattern.columns() - frames) * FRAME_PARAMETERS;
     let freedoms = (frames * POSE + of_shape - tied) as f64;
-    let (of_pixels, of_prior) = (trace(scatter) / curvature.powi(2), trace(prior));
+    let of_pixels = (of_scatter - of_exposures[0]) / curvature.powi(2);
+    let of_prior = of_prior - of_exposures[1];
     // The freedoms that pixels determine, by their share of the information.
     let determined = freedoms - of_prior;
     Ok(NoiseCovariance {
@@ -194,6 +187,21 @@ pub fn compute_covariances(
         },
         determined,
     })
+}
+
+/// `tr(H_ee⁻¹ Q_ee)` of these matrices Q, e being the exposures.
+fn traces_of_exposures(
+    pattern: &Pattern,
+    frames: usize,
+    normal: &NormalEquations,
+    matrices: [&[Block]; 2],
+) -> Result<[f64; 2], FactorError> {
+    let exposures = ExposurePattern::new(pattern, frames);
+    let inverse = SelectedInverse::new(&exposures.slots, &exposures.equations(pattern, normal))?;
+    Ok(matrices.map(|of| {
+        let of = exposures.blocks(pattern, of);
+        trace_of_product(&exposures.slots, &inverse, &of)
+    }))
 }
 
 /// `tr(H⁻¹ Q)` of a symmetric matrix Q with the upper `blocks` on `pattern`.
@@ -210,40 +218,6 @@ fn trace_of_product(pattern: &Pattern, inverse: &SelectedInverse, blocks: &[Bloc
         }
     }
     trace
-}
-
-/// The parts of the blocks that belong to the exposures of the first `frames` slots.
-fn exposures_parts(pattern: &Pattern, frames: usize, blocks: &[Block]) -> Vec<Block> {
-    let mut parts = vec![Block::zeros(); blocks.len()];
-    for column in 0..frames {
-        for &row in pattern.rows(column) {
-            if let Some(index) = pattern.block_index(row, column) {
-                parts[index]
-                    .fixed_view_mut::<EXPOSURE, EXPOSURE>(POSE, POSE)
-                    .copy_from(&blocks[index].fixed_view::<EXPOSURE, EXPOSURE>(POSE, POSE));
-            }
-        }
-    }
-    parts
-}
-
-/// The normal matrix for known poses and shape: `diag(I, H_ee)`, with exposures in the first
-/// `frames` slots.
-pub fn exposures_alone(
-    pattern: &Pattern,
-    frames: usize,
-    normal: &NormalEquations,
-) -> NormalEquations {
-    let mut alone = NormalEquations {
-        blocks: exposures_parts(pattern, frames, &normal.blocks),
-        ..NormalEquations::zeros(pattern)
-    };
-    let poses = Block::from_diagonal(&FrameStep::from_fn(|k, _| if k < POSE { 1.0 } else { 0.0 }));
-    for k in 0..pattern.columns() {
-        let known = if k < frames { poses } else { Block::identity() };
-        alone.add_block(pattern, k, k, &known);
-    }
-    alone
 }
 
 #[cfg(test)]
@@ -296,9 +270,10 @@ mod tests {
         assert!((one.1[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
         assert!((one.1[2][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
         let mut exposed = normal.blocks.clone();
-        let exposures = exposures_parts(&pattern, 3, &normal.blocks);
-        for (block, exposures) in exposed.iter_mut().zip(exposures) {
-            *block += exposures * 9.0;
+        for (block, normal) in exposed.iter_mut().zip(&normal.blocks) {
+            let exposures = normal.fixed_view::<2, 2>(POSE, POSE) * 9.0;
+            let mut part = block.fixed_view_mut::<2, 2>(POSE, POSE);
+            part += exposures;
         }
         let same = at(&exposed, &none, 1.0);
         assert!((same.0 - 1.0).abs() < 1e-12);

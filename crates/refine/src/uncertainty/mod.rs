@@ -1,8 +1,9 @@
 //! The stated uncertainty, and tests of the model that it rests on.
 //!
 //! ```text
-//! observed_curvature → covariance, frame_sigma → overdispersion ─┐
-//! observability ─────────────────────────────────────────────────┴→ solution_uncertainty
+//! observed_curvature, exposure_equations → covariance, model_error
+//! covariance, frame_sigma ──→ overdispersion ─┐
+//! observability ──────────────────────────────┴→ solution_uncertainty
 //! observability → calibration_report, rolling_shutter_test
 //! ```
 //!
@@ -16,6 +17,7 @@ pub mod calibration_report;
 pub mod covariance;
 pub mod covariance_file;
 pub mod cramer_rao;
+pub mod exposure_equations;
 pub mod frame_sigma;
 pub mod masked_report;
 pub mod model_error;

@@ -39,7 +39,7 @@
 
 use crate::linear::bordered_system::SharedBlock;
 use crate::linear::normal_equations::{Block, Pattern};
-use crate::linear::sparse_cholesky::Factor;
+use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
 use crate::model::problem_error::ProblemError;
 use crate::model::significance::normal_quantile;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
@@ -48,7 +48,8 @@ use crate::points::equations::PointEquations;
 use crate::problem::patch_scores::PatchScores;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::gauss_newton::Solution;
-use crate::uncertainty::covariance::{NoiseCovariance, exposures_alone};
+use crate::uncertainty::covariance::NoiseCovariance;
+use crate::uncertainty::exposure_equations::ExposurePattern;
 use crate::uncertainty::observability::Posterior;
 use crate::uncertainty::pixel_jacobians::PointJacobians;
 use nalgebra::SMatrix;
@@ -117,9 +118,12 @@ impl EstimateErrors {
         let pattern = problem.pattern();
         let normal = &solution.linearisation.normal;
         let frames = solution.unknowns.frames.len();
-        let exposures_alone = exposures_alone(pattern, frames, normal);
-        let exposures = problem.symbolic().factorise(pattern, &exposures_alone, 0.0);
-        let exposures = exposures.map_err(|source| problem.factor_error(source))?;
+        let exposures = ExposurePattern::new(pattern, frames);
+        let symbolic = SymbolicFactorisation::new(&exposures.slots);
+        let symbolic = symbolic.map_err(|source| problem.factor_error(source))?;
+        let equations = exposures.equations(pattern, normal);
+        let of_exposures = symbolic.factorise(&exposures.slots, &equations, 0.0);
+        let of_exposures = of_exposures.map_err(|source| problem.factor_error(source))?;
         let (prior, _) = problem.prior_information(&solution.unknowns);
         let Some(prior) = PriorRoot::of(pattern, &prior) else {
             return Ok(None);
@@ -127,7 +131,7 @@ impl EstimateErrors {
         let draw = |scores: &PatchScores, posterior, curvature| {
             let system = System {
                 factor,
-                exposures: &exposures,
+                exposures: (&exposures, &of_exposures),
                 posterior,
                 scores,
                 prior: &prior,
@@ -250,8 +254,8 @@ impl ModelErrorReport {
 /// The equations, and the scores of patches that are drawn from.
 struct System<'s> {
     factor: &'s Factor<'s>,
-    /// Factor of the equations for known poses.
-    exposures: &'s Factor<'s>,
+    /// Exposures, and the factor of their equations for known poses.
+    exposures: (&'s ExposurePattern, &'s Factor<'s>),
     posterior: Option<&'s Posterior>,
     scores: &'s PatchScores,
     prior: &'s PriorRoot,
@@ -309,11 +313,9 @@ impl System<'_> {
             z_shared += score.shared * signs;
         }
         let of_pixels = self.factor.solve(&z);
-        let mut exposures_alone = vec![BatchBlock::zeros(); count];
-        for (exposures, z) in exposures_alone.iter_mut().zip(&z[..frames]) {
-            *exposures = exposure_rows(z);
-        }
-        let of_exposures = self.exposures.solve(&exposures_alone);
+        let (pattern, factor) = self.exposures;
+        let exposures_alone = pattern.rows(&z[..frames]);
+        let of_exposures = factor.solve(&exposures_alone);
         let product = |a: &[BatchBlock], b: &[BatchBlock]| -> f64 {
             a.iter().zip(b).map(|(a, b)| a.component_mul(b).sum()).sum()
         };
@@ -380,11 +382,4 @@ impl PriorRoot {
             last = normal;
         }
     }
-}
-
-/// The rows of the exposure, with zeros for the pose.
-fn exposure_rows(block: &BatchBlock) -> BatchBlock {
-    let mut rows = *block;
-    rows.fixed_rows_mut::<6>(0).fill(0.0);
-    rows
 }

@@ -18,30 +18,32 @@
 //! conditions", 1967; M. F. Hutchinson, "A stochastic estimator of the trace of the influence matrix
 //! for Laplacian smoothing splines", Communications in Statistics 18(3), 1989 (random signs).
 
-use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameStep;
 use crate::problem::linearisation::Linearisation;
 use crate::solver::gauss_newton::Solution;
+use crate::uncertainty::exposure_equations::POSE;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-/// Unknowns of a frame's pose.
-const POSE: usize = 6;
 
 /// Curvature of a solution whose score does not change, or the wrong way: with it σ are a thousand
 /// times those of a good solution, and nothing is believed.
 const NO_CURVATURE: f64 = 1e-3;
 
-/// Observes κ at a solution; `factor`: of its normal matrix.
+/// Observes κ at a solution; 1 if its normal matrix is singular, as nothing is known of it then.
 ///
 /// # Errors
 /// A frame that has to be read again and cannot be.
-pub fn observe_curvature(solution: &Solution, factor: &Factor) -> Result<f64, ProblemError> {
+pub fn observe_curvature(solution: &Solution) -> Result<f64, ProblemError> {
     let (problem, at) = (&solution.problem, &solution.linearisation);
     let from = &solution.linearised_at;
-    let step = factor.step(&scores_with_random_signs(solution));
+    let scores = scores_with_random_signs(solution);
+    let factor = problem.symbolic().factorise(problem.pattern(), &at.normal, 0.0);
+    // The factor is large; it is not kept.
+    let Ok(step) = factor.map(|factor| factor.step(&scores)) else {
+        return Ok(1.0);
+    };
     let to = problem.stepped(from, &step, &Kappa::zeros());
     let moved = problem.wall_step_px(&from.frames, &step, &Kappa::zeros());
     let step_px = moved.into_iter().fold(0.0, f64::max);

@@ -58,13 +58,7 @@ impl SolutionUncertainty {
         let problem = &solution.problem;
         let frames = solution.unknowns.frames.len();
         let scatter = problem.score_scatter(&solution.linearisation);
-        let normal = &solution.linearisation.normal;
-        let factor = problem.symbolic().factorise(problem.pattern(), normal, 0.0);
-        let curvature = match &factor {
-            Ok(factor) => observe_curvature(solution, factor)?,
-            // Nothing is known of the poses then.
-            Err(_) => 1.0,
-        };
+        let curvature = observe_curvature(solution)?;
         let posterior = Posterior::at(solution, &scatter, curvature);
         let posterior = posterior.map_err(|source| problem.factor_error(source))?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
@@ -82,6 +76,8 @@ impl SolutionUncertainty {
         // Poses without a covariance still count; they are reported as uncertain.
         let total = match of_noise {
             Ok(of_noise) => {
+                let normal = &solution.linearisation.normal;
+                let factor = problem.symbolic().factorise(problem.pattern(), normal, 0.0);
                 let factor = factor.map_err(|source| problem.factor_error(source))?;
                 let posterior = posterior.as_ref();
                 let at_end = (&factor, curvature);

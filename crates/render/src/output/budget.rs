@@ -112,6 +112,13 @@ impl Budget {
         })
     }
 
+    /// Keeps no more frames than a band needs: enough where each is used for one purpose only.
+    #[must_use]
+    pub fn without_spare_room(self) -> Self {
+        let room = self.room.min(self.frames_least);
+        Self { room, ..self }
+    }
+
     /// Largest memory at any time, with `frames` bytes of frames in all.
     pub fn most(&self, frames: u64) -> u64 {
         self.thumbnails

@@ -76,6 +76,14 @@ impl Coverage {
         21 * cells(canvas, cell(canvas))
     }
 
+    /// Adds what another one of the same canvas has seen.
+    pub fn absorb(&mut self, part: &Self) {
+        for (own, part) in self.holes.iter_mut().zip(&part.holes) {
+            *own += part;
+        }
+        self.covered += part.covered;
+    }
+
     /// Share of the canvas that some frame sees, 0–1.
     pub fn share(&self) -> f64 {
         self.covered as f64 / self.canvas.pixels() as f64

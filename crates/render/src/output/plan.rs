@@ -17,6 +17,7 @@ use crate::sampling::picture_cache::PictureCache;
 use crate::sampling::thumbnails::Thumbnails;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
@@ -171,25 +172,29 @@ impl<'a> Plan<'a> {
         targets: &mut [&mut dyn Target],
         progress: &dyn Progress,
     ) -> Result<(), RenderError> {
-        self.draw_from(0, frames, room, targets, progress)
+        self.draw_bands(0..self.bands(), frames, room, targets, progress)
     }
 
-    /// Draws all bands but the `first` ones, which the targets have received before.
+    /// Number of bands.
+    pub fn bands(&self) -> usize {
+        self.canvas.rows.div_ceil(BAND_ROWS) as usize
+    }
+
+    /// Draws some of the bands.
     ///
     /// # Errors
     /// As [`Plan::draw`].
-    pub fn draw_from(
+    pub fn draw_bands(
         &self,
-        first: usize,
+        bands: Range<usize>,
         frames: &mut PictureCache,
         room: u64,
         targets: &mut [&mut dyn Target],
         progress: &dyn Progress,
     ) -> Result<(), RenderError> {
-        let starts: Vec<u32> = (0..self.canvas.rows).step_by(BAND_ROWS as usize).collect();
+        let starts: Vec<u32> = bands.map(|band| band as u32 * BAND_ROWS).collect();
         let needs: Vec<Vec<usize>> = starts.par_map(|row| self.needed(frames, &self.tiles(*row)));
         progress.start(DRAWING, starts.len());
-        progress.advance(first.min(starts.len()));
         let sources = targets.iter().any(|target| target.wants_sources());
         let empty = || Band::empty(&self.canvas, frames.format(), sources);
         // While a band is drawn the one before is written.
@@ -204,7 +209,7 @@ impl<'a> Plan<'a> {
             Ok::<_, RenderError>(())
         };
         let mut readings = FrameReadings::default();
-        for (k, row) in starts.iter().enumerate().skip(first) {
+        for (k, row) in starts.iter().enumerate() {
             let later: Vec<usize> = needs[k + 1..]
                 .iter()
                 .take(Budget::BANDS_AHEAD)

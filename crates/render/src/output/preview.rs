@@ -64,6 +64,15 @@ impl Preview {
         }
     }
 
+    /// Adds what another one of the same canvas has received.
+    pub fn absorb(&mut self, part: &Self) {
+        for (own, part) in self.sums.iter_mut().zip(&part.sums) {
+            for (own, part) in own.iter_mut().zip(part) {
+                *own += part;
+            }
+        }
+    }
+
     /// Draws the picture, at most 4096 px long, with chainage in metres along one side and clock
     /// positions along the other, twelve o'clock at θ = `twelve_at_deg`.
     pub fn picture(&self, surface: &dyn Surface, layout: Layout, twelve_at_deg: f64) -> RgbImage {

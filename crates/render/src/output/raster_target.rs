@@ -126,6 +126,19 @@ impl RasterTarget {
         }
     }
 
+    /// Takes over the tiles of another part of the panorama, compressed in the file `tiles`.
+    ///
+    /// # Errors
+    /// As [`CogWriter::absorb`]; [`RasterError::Unsupported`] for a Deep Zoom picture.
+    pub fn absorb(&mut self, part: RasterState, tiles: &Path) -> Result<(), RasterError> {
+        match (&mut self.writer, part) {
+            (Writer::Cog(writer), RasterState::Cog(part)) => writer.absorb(part, tiles),
+            _ => Err(RasterError::Unsupported(
+                "only GeoTIFF files are put together from parts",
+            )),
+        }
+    }
+
     /// Memory of such a file until it is finished, bytes.
     pub fn pending_bytes(
         canvas: &Canvas,

@@ -164,6 +164,41 @@ fn order_batches_and_threads_leave_no_trace() {
     }
 }
 
+/// A picture that is divided among three writers, by rows and by columns.
+#[test]
+fn parts_together_are_the_bytes_of_the_whole() {
+    for spec in specs() {
+        let whole = written(spec, Compression::Deflate, 1, in_order);
+        for part_of in [
+            |tile: &RasterTile| (tile.row as usize).min(2),
+            |tile: &RasterTile| tile.column as usize % 3,
+        ] {
+            let dir = tempfile::tempdir().unwrap();
+            let target = dir.path().join("a.tif");
+            let mut writer = CogWriter::begin(&target, spec, Compression::Deflate).unwrap();
+            for part in [2, 0, 1] {
+                let spool = dir.path().join(format!("part-{part}"));
+                let begin = |state| {
+                    CogWriter::begin_resumable(&target, spec, Compression::Deflate, &spool, state)
+                };
+                let mut all = tiles(&spec);
+                all.retain(|tile| part_of(tile) == part);
+                let mut one = begin(None).unwrap();
+                one.add(all).unwrap();
+                let state = postcard::to_allocvec(&one.state().unwrap()).unwrap();
+                let state = || postcard::from_bytes::<CogState>(&state).unwrap();
+                writer.absorb(state(), &spool).unwrap();
+                if part == 0 {
+                    let twice = writer.absorb(state(), &spool).unwrap_err();
+                    assert!(matches!(twice, RasterError::Tile { .. }), "{twice}");
+                }
+            }
+            finish(writer).unwrap();
+            assert!(std::fs::read(&target).unwrap() == whole);
+        }
+    }
+}
+
 #[test]
 fn every_tile_stands_between_its_size_and_its_end() {
     let spec = RasterSpec {

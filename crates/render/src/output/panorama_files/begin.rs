@@ -3,7 +3,7 @@
 use super::files::PanoramaFiles;
 use super::maps::{COVERAGE, FRAMES, MapFiles};
 use super::options::PanoramaFileOptions;
-use super::state::{FilesState, MapsState, STATE};
+use super::state::{FilesState, MapsState, PANORAMA, STATE};
 use crate::error::RenderError;
 use crate::layout::canvas::{Canvas, Layout};
 use crate::output::gaps::Coverage;
@@ -91,7 +91,7 @@ impl PanoramaFileOptions {
         let cog = if self.is_tiff() {
             let layer = RasterLayer::Panorama;
             let compression = self.compression;
-            Some(begin.cog(&self.out, layer, compression, "panorama", state.cog)?)
+            Some(begin.cog(&self.out, layer, compression, PANORAMA, state.cog)?)
         } else {
             None
         };

@@ -67,7 +67,7 @@ impl PanoramaFiles {
     }
 
     /// State for the checkpoint.
-    fn state(&self) -> Result<FilesState<'_>, WriteError> {
+    pub(super) fn state(&self) -> Result<FilesState<'_>, WriteError> {
         Ok(FilesState {
             bands: self.bands,
             coverage: Some(Cow::Borrowed(&self.coverage)),

@@ -13,7 +13,7 @@ use crate::output::raster_target::RasterTarget;
 use image::DynamicImage;
 use nalgebra::Matrix6;
 use std::borrow::Cow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tunnelstitch_core::frames::{PictureFormat, add_picture};
 use tunnelstitch_core::persist::atomic::{OutputSet, WriteError};
 use tunnelstitch_core::raster::{Quantity, RasterError};
@@ -79,6 +79,25 @@ impl MapFiles {
             frames: Some(self.frames.state()?),
             preview: Some(Cow::Borrowed(&self.preview)),
         })
+    }
+
+    /// Takes over the maps of another part of the panorama, whose tiles are in `folder`.
+    ///
+    /// # Errors
+    /// As [`RasterTarget::absorb`].
+    pub(super) fn absorb(&mut self, part: MapsState, folder: &Path) -> Result<(), RasterError> {
+        for (target, state, name) in [
+            (&mut self.coverage, part.coverage, COVERAGE),
+            (&mut self.frames, part.frames, FRAMES),
+        ] {
+            if let Some(state) = state {
+                target.absorb(state, &folder.join(name))?;
+            }
+        }
+        if let Some(preview) = part.preview {
+            self.preview.absorb(&preview);
+        }
+        Ok(())
     }
 
     /// Maps that receive bands.

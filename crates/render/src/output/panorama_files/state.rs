@@ -10,6 +10,9 @@ use std::borrow::Cow;
 /// Name of the state in the checkpoint.
 pub(super) const STATE: &str = "files";
 
+/// Name of the panorama's compressed tiles in the checkpoint.
+pub(super) const PANORAMA: &str = "panorama";
+
 /// State of all files; by default nothing has begun.
 #[derive(Default, Serialize, Deserialize)]
 pub(super) struct FilesState<'a> {
