@@ -1,13 +1,13 @@
 //! The search: all readings against the one given.
 
-use super::comparison::Comparison;
+use super::comparison::{Comparison, FittingPair, PriorEvidence, overdispersion};
 use super::finding::FittingReadings;
 use super::picture_pairs::PicturePairs;
 use super::telling_pairs::{TellingPair, telling_pairs};
 use crate::error::RefineError;
 use crate::options::RefineOptions;
 use crate::tracking::neighbour_pairs::first_frames;
-use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
+use crate::tracking::registration::MAX_DEVIATION_COST;
 use tunnelstitch_core::survey::{PoseReading, Survey, SurveyError};
 
 /// Smallest number of pairs: fewer may fit by chance.
@@ -69,8 +69,9 @@ impl Found<'_> {
 ///
 /// A frame is registered on the wall that the one before it shows, as tracking does, from the
 /// reading's pose and within its prior. Where it is found in both readings, the evidence against
-/// the one given is by how much less the frame deviates from the prior, `½ eᵀΣ⁻¹e`, and, with
-/// another camera, by how much better it correlates. A reading is taken if three
+/// the one given is by how much less the displacement that the pictures measure deviates from the
+/// prior ([`crate::tracking::innovation`]), and, with another camera, by how much better it
+/// correlates. A reading is taken if three
 /// quarters of the pairs fit and speak for it, and its odds exceed the number of readings over the
 /// survey's rate of false alarms. There may be several: poses exactly as planned, seen from the
 /// tunnel's other end, are those of another convention.
@@ -112,6 +113,7 @@ fn among_all_pairs<'r>(
     let mut comparison = Comparison {
         of_given: pictures.register(given, |_| true)?,
         telling: vec![true; firsts.len()],
+        false_alarm_nats: least_nats,
         least_nats,
         min_pair_nats: 0.0,
     };
@@ -145,11 +147,11 @@ fn among_telling_pairs<'r>(
     let firsts: Vec<usize> = telling.iter().map(|pair| pair.first).collect();
     let mut pictures = PicturePairs::load(survey, &firsts)?;
     let compared =
-        |k: usize, of_given: &[Option<Registered>]| compared(&telling, k, of_given, least_nats);
+        |k: usize, of_given: &[Option<FittingPair>]| compared(&telling, k, of_given, least_nats);
     // Pairs that are still to be registered may not fit as given.
-    let may_take_any = |some: &[Option<Registered>]| {
+    let may_take_any = |some: &[Option<FittingPair>]| {
         let mut all = (0..shifted.len()).filter_map(|k| compared(k, some));
-        all.any(|comparison| comparison.may_take(&[]))
+        all.any(|comparison| comparison.may_take(&[], PriorEvidence::Deviation))
     };
     let of_given = pictures.register(given, may_take_any)?;
     if !may_take_any(&of_given) {
@@ -169,7 +171,7 @@ fn among_telling_pairs<'r>(
 fn compared(
     telling: &[TellingPair],
     k: usize,
-    of_given: &[Option<Registered>],
+    of_given: &[Option<FittingPair>],
     least_nats: f64,
 ) -> Option<Comparison> {
     let mut of_given = of_given.to_vec();
@@ -182,6 +184,7 @@ fn compared(
     is_enough.then_some(Comparison {
         of_given,
         telling: tells,
+        false_alarm_nats: least_nats,
         least_nats,
         min_pair_nats: MIN_SHIFT_NATS,
     })
@@ -193,13 +196,21 @@ fn compare<'r>(
     comparison: &Comparison,
     reading: &'r PoseReading,
 ) -> Result<Option<Found<'r>>, RefineError> {
-    if !comparison.may_take(&[]) {
+    let by = if reading.error_scale < 1.0 {
+        PriorEvidence::Innovation
+    } else {
+        PriorEvidence::Deviation
+    };
+    if !comparison.may_take(&[], by) {
         return Ok(None);
     }
-    let registered = pictures.register(reading, |some| comparison.may_take(some))?;
-    let pair_nats = comparison.pair_nats(&registered, reading.changes_camera());
+    let registered = pictures.register(reading, |some| comparison.may_take(some, by))?;
+    let pair_nats = comparison.pair_nats(&registered, by, reading.changes_camera());
     let log_odds = reading.prior_nats + pair_nats.iter().sum::<f64>();
-    let is_taken = comparison.may_take(&registered) && log_odds > comparison.least_nats;
+    let significant_nats = log_odds / overdispersion(&registered, by);
+    let is_taken = comparison.may_take(&registered, by)
+        && significant_nats > comparison.false_alarm_nats
+        && log_odds > comparison.least_nats;
     Ok(is_taken.then(|| Found {
         reading,
         fitting: registered.iter().flatten().count(),
