@@ -3,6 +3,11 @@
 use crate::tracking::neighbour_pairs::RegisteredPair;
 use crate::tracking::registration::MAX_DEVIATION_COST;
 
+/// Smallest number of pairs: fewer may fit by chance.
+pub const MIN_PAIRS: usize = 4;
+/// Standard errors by which differences of pairs exceed zero: the 95 % quantile of a normal
+/// distribution.
+const MIN_TOLD_SIGMAS: f64 = 1.645;
 /// Freedoms of a displacement: those of a pose.
 const FREEDOMS: f64 = 6.0;
 
@@ -11,24 +16,20 @@ const FREEDOMS: f64 = 6.0;
 pub struct FittingPair {
     /// Deviation of the estimate from the prior's prediction, `½ eᵀΣ⁻¹e`.
     pub deviation: f64,
-    /// Half the squared Mahalanobis distance of the measured displacement from the prediction, at
-    /// most the deviation up to which a pair fits.
+    /// Half the squared Mahalanobis distance of the measured displacement from the prediction.
     pub innovation: f64,
-    /// Nats by which the measurement's density is lower in the reading than under the prior given.
-    pub density_nats: f64,
     /// Log-likelihood of the correlation, nats.
     pub log_likelihood: f64,
 }
 
 impl FittingPair {
-    /// The pair in a reading whose errors of positions are `error_scale` times those given.
-    pub fn of(registered: &RegisteredPair, error_scale: f64) -> Self {
+    /// The pair as it is registered in a reading.
+    pub fn of(registered: &RegisteredPair) -> Self {
         let innovation = registered.innovation.as_ref();
         let cost = innovation.map_or(registered.deviation, |innovation| innovation.cost());
         Self {
             deviation: registered.deviation,
-            innovation: cost.min(MAX_DEVIATION_COST),
-            density_nats: innovation.map_or(0.0, |found| found.density_nats(error_scale)),
+            innovation: cost,
             log_likelihood: registered.log_likelihood,
         }
     }
@@ -42,8 +43,10 @@ pub type FittingPairs = Vec<Option<FittingPair>>;
 pub enum PriorEvidence {
     /// Under one prior, estimates in both readings are pulled back alike: their deviations tell.
     Deviation,
-    /// A narrower prior pulls estimates back farther where pictures measure little: the measured
-    /// displacements tell, with their own covariance.
+    /// With another radius, pictures measure other lengths, and a narrower prior pulls estimates
+    /// back farther where they measure little: the measured displacements tell, with their own
+    /// covariance. A narrower prior that fits as well is no evidence: σ that are stated too large
+    /// would be some.
     Innovation,
 }
 
@@ -80,9 +83,7 @@ impl Comparison {
         by: PriorEvidence,
     ) -> impl Iterator<Item = f64> + 'a {
         let pairs = reading.iter().zip(&self.of_given);
-        pairs.map(move |(reading, given)| {
-            by.cost(given) - by.cost(reading) - reading.map_or(0.0, |pair| pair.density_nats)
-        })
+        pairs.map(move |(reading, given)| by.cost(given) - by.cost(reading))
     }
 
     /// Evidence of each pair for a reading against the one given, nats, by priors alone, or by
@@ -107,6 +108,24 @@ impl Comparison {
             .collect()
     }
 
+    /// True if the pairs that fit in both readings correlate better as given by more than that
+    /// scatters. In strong noise a pair fits somewhere in any reading, but only at the right place
+    /// does it correlate by more than noise does.
+    ///
+    /// Under a narrower prior, estimates are held away from where they correlate best, which the
+    /// innovation counts already.
+    pub fn is_contradicted(&self, reading: &[Option<FittingPair>], by: PriorEvidence) -> bool {
+        if by == PriorEvidence::Innovation {
+            return false;
+        }
+        let pairs = reading.iter().zip(&self.of_given);
+        let both = pairs.filter_map(|(reading, given)| (*reading).zip(*given));
+        let differences: Vec<f64> = both
+            .map(|(reading, given)| given.log_likelihood - reading.log_likelihood)
+            .collect();
+        differences.len() >= MIN_PAIRS && exceeds_scatter(&differences)
+    }
+
     /// True if a reading may be taken whose first pairs are `reading` and in which all others fit
     /// without any deviation: if its odds by priors suffice, three quarters of the pairs fit, and
     /// three quarters of those that tell it from the one given speak for it.
@@ -127,6 +146,17 @@ impl Comparison {
             && 4 * fitting >= 3 * self.of_given.len()
             && 4 * for_it >= 3 * all
     }
+}
+
+/// True if differences of the evidence of pairs exceed zero in the mean by more than they scatter.
+///
+/// Source: Q. H. Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses",
+/// Econometrica 57, 1989.
+pub fn exceeds_scatter(differences: &[f64]) -> bool {
+    let count = differences.len() as f64;
+    let sum: f64 = differences.iter().sum();
+    let squares: f64 = differences.iter().map(|d| (d - sum / count).powi(2)).sum();
+    sum > MIN_TOLD_SIGMAS * squares.sqrt()
 }
 
 /// Mean square of the displacements of all pairs that fit over the expected one, at least 1.
@@ -153,7 +183,6 @@ mod tests {
         Some(FittingPair {
             deviation: cost,
             innovation: cost,
-            density_nats: 0.0,
             log_likelihood: 0.0,
         })
     }
@@ -193,6 +222,32 @@ mod tests {
         assert!(!comparison.may_take(&[[fits(3.0); 6], [None; 6]].concat(), Deviation));
         // Two of six speak against it, by too little to speak for it.
         assert!(!comparison.may_take(&[fits(20.0), fits(20.0)], Deviation));
+    }
+
+    /// Pairs that fit in two readings correlate at the right place, and by chance in the other.
+    #[test]
+    fn pairs_that_correlate_as_given_contradict() {
+        let correlates = |log_likelihood: f64| {
+            fits(1.0).map(|pair| FittingPair {
+                log_likelihood,
+                ..pair
+            })
+        };
+        let comparison = Comparison {
+            of_given: [30.0, 40.0, 35.0, 45.0].map(correlates).to_vec(),
+            telling: vec![true; 4],
+            false_alarm_nats: 9.5,
+            least_nats: 9.5,
+            min_pair_nats: 0.0,
+        };
+        let is_contradicted = |reading: [f64; 4]| {
+            let reading = reading.map(correlates);
+            comparison.is_contradicted(&reading, Deviation)
+        };
+        assert!(is_contradicted([5.0, 7.0, 4.0, 6.0]));
+        assert!(!is_contradicted([25.0, 45.0, 40.0, 38.0]));
+        assert!(!is_contradicted([60.0, 60.0, 60.0, 60.0]));
+        assert!(!comparison.is_contradicted(&[correlates(5.0), None, None, None], Deviation));
     }
 
     /// Noise that scatters displacements alike in two readings tells less than it seems to.

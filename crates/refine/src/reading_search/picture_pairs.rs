@@ -89,8 +89,8 @@ impl<'s> PicturePairs<'s> {
         let rejections = turned.prescreened.rejections.clone();
         let states = FrameStates::at(&setup.prior.initial, rejections);
         let fitting = |some: &[Option<RegisteredPair>]| -> FittingPairs {
-            let fitting = |pair: &RegisteredPair| FittingPair::of(pair, reading.error_scale);
-            some.iter().map(|pair| pair.as_ref().map(fitting)).collect()
+            let fitting = some.iter().map(|pair| pair.as_ref().map(FittingPair::of));
+            fitting.collect()
         };
         let is_wanted = |some: &[Option<RegisteredPair>]| is_wanted(&fitting(some));
         let registered = register_pairs(&context, &options, &states, &self.firsts, is_wanted)?;
@@ -131,6 +131,7 @@ impl<'s> PicturePairs<'s> {
         options: &'a RefineOptions,
     ) -> Result<Setup<'a>, RefineError> {
         let given = self.survey.prior;
+        let error_scale = reading.error_scale();
         let input = RefineInput {
             cameras: reading.camera.camera(self.survey.cameras.of(0)).into(),
             frames,
@@ -138,7 +139,7 @@ impl<'s> PicturePairs<'s> {
             prior: Jitter {
                 translation_sigma_m: given
                     .translation_sigma_m
-                    .map(|sigma_m| reading.error_scale * sigma_m),
+                    .map(|sigma_m| error_scale * sigma_m),
                 ..given
             },
             pose_gaps: &[],

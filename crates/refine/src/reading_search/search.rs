@@ -1,6 +1,8 @@
 //! The search: all readings against the one given.
 
-use super::comparison::{Comparison, FittingPair, PriorEvidence, overdispersion};
+use super::comparison::{
+    Comparison, FittingPair, MIN_PAIRS, PriorEvidence, exceeds_scatter, overdispersion,
+};
 use super::finding::FittingReadings;
 use super::picture_pairs::PicturePairs;
 use super::telling_pairs::{TellingPair, telling_pairs};
@@ -10,14 +12,9 @@ use crate::tracking::neighbour_pairs::first_frames;
 use crate::tracking::registration::MAX_DEVIATION_COST;
 use tunnelstitch_core::survey::{PoseReading, Survey, SurveyError};
 
-/// Smallest number of pairs: fewer may fit by chance.
-const MIN_PAIRS: usize = 4;
 /// Evidence below that of the best reading with which another is named beside it, nats: odds of one
 /// to twenty.
 const MAX_DEFICIT_NATS: f64 = 3.0;
-/// Standard errors by which the evidence of pairs for the best reading exceeds that for another one
-/// that it is distinguished from: the 95 % quantile of a normal distribution.
-const MIN_TOLD_SIGMAS: f64 = 1.645;
 /// Evidence of a pair that speaks for poses of other frames, nats: half of that by which its steps
 /// differ at least.
 const MIN_SHIFT_NATS: f64 = 0.5 * MAX_DEVIATION_COST;
@@ -48,19 +45,15 @@ struct Found<'r> {
 
 impl Found<'_> {
     /// True if a reading that has more evidence is distinguished from this one: by its odds, and by
-    /// the evidence of pairs, which differs by more than it scatters (Q. H. Vuong, "Likelihood
-    /// ratio tests for model selection and non-nested hypotheses", Econometrica 57, 1989).
+    /// the evidence of pairs, which differs by more than it scatters.
     fn is_distinguished_from(&self, best: &Self) -> bool {
         if best.log_odds - self.log_odds <= MAX_DEFICIT_NATS {
             return false;
         }
         let pairs = best.pair_nats.iter().zip(&self.pair_nats);
         let differences: Vec<f64> = pairs.map(|(best, own)| best - own).collect();
-        let count = differences.len() as f64;
-        let sum: f64 = differences.iter().sum();
-        let squares: f64 = differences.iter().map(|d| (d - sum / count).powi(2)).sum();
         let is_usual = self.reading.prior_nats >= 0.0;
-        differences.is_empty() || !is_usual || sum > MIN_TOLD_SIGMAS * squares.sqrt()
+        differences.is_empty() || !is_usual || exceeds_scatter(&differences)
     }
 }
 
@@ -73,7 +66,7 @@ impl Found<'_> {
 /// prior ([`crate::tracking::innovation`]), and, with another camera, by how much better it
 /// correlates. A reading is taken if three
 /// quarters of the pairs fit and speak for it, and its odds exceed the number of readings over the
-/// survey's rate of false alarms. There may be several: poses exactly as planned, seen from the
+/// survey's rate of false alarms, by more than pairs scatter. There may be several: poses exactly as planned, seen from the
 /// tunnel's other end, are those of another convention.
 ///
 /// Poses of other frames are compared by the pairs that tell them ([`telling_pairs`]), all other
@@ -196,7 +189,7 @@ fn compare<'r>(
     comparison: &Comparison,
     reading: &'r PoseReading,
 ) -> Result<Option<Found<'r>>, RefineError> {
-    let by = if reading.error_scale < 1.0 {
+    let by = if reading.changes_radius() {
         PriorEvidence::Innovation
     } else {
         PriorEvidence::Deviation
@@ -209,6 +202,8 @@ fn compare<'r>(
     let log_odds = reading.prior_nats + pair_nats.iter().sum::<f64>();
     let significant_nats = log_odds / overdispersion(&registered, by);
     let is_taken = comparison.may_take(&registered, by)
+        && !comparison.is_contradicted(&registered, by)
+        && exceeds_scatter(&pair_nats)
         && significant_nats > comparison.false_alarm_nats
         && log_odds > comparison.least_nats;
     Ok(is_taken.then(|| Found {
@@ -257,7 +252,7 @@ mod tests {
             orientation: PictureOrientation::Stored,
             camera: CameraReading::AsGiven,
             shift_frames: 0,
-            error_scale: 1.0,
+            radius_factor: 1.0,
         }
     }
 

@@ -2,9 +2,9 @@
 //!
 //! Pictures measure the pose of a frame with an information J that is small, or zero, in weak
 //! directions: a small rotation looks like a small translation. There the estimate stays where the
-//! prior predicts it, whatever the prior. So the estimate's deviation `½ eᵀΣ⁻¹e` and its density
-//! under the prior do not tell priors apart, but the innovation does: the displacement
-//! `m = e + J⁻¹Σ⁻¹e` that the pictures alone ask for has the covariance `Σ + J⁻¹`.
+//! prior predicts it, whatever the prior. So the estimate's deviation `½ eᵀΣ⁻¹e` does not tell
+//! priors apart, but the innovation does: the displacement `m = e + J⁻¹Σ⁻¹e` that the pictures alone
+//! ask for has the covariance `Σ + J⁻¹`.
 //!
 //! Source: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, "Estimation with Applications to Tracking and
 //! Navigation", 2001, 5.2.3 (innovation and its covariance).
@@ -76,19 +76,6 @@ impl Innovation {
             .map(|(error, information)| error * error * (1.0 + information.recip()))
             .sum::<f64>()
     }
-
-    /// Nats by which the density of the measurement is lower under the prior than under one whose
-    /// 1-σ of translation are `1/scale` times as large: `½ ln(|Σ + J⁻¹| / |Σ' + J⁻¹|)`. Directions
-    /// that the pictures do not measure add nothing.
-    pub fn density_nats(&self, scale: f64) -> f64 {
-        let wider = Vector6::from_fn(|k, _| if k < 3 { 1.0 } else { scale.recip() });
-        let wider = Matrix6::from_diagonal(&wider);
-        let log_volume = |information: Matrix6<f64>| -> f64 {
-            let values = information.symmetric_eigenvalues();
-            values.iter().map(|value| value.max(0.0).ln_1p()).sum()
-        };
-        0.5 * (log_volume(self.information) - log_volume(wider * self.information * wider))
-    }
 }
 
 /// The information about the pose that is left when the exposure is estimated, too, from the
@@ -127,14 +114,6 @@ mod tests {
             assert!((cost - expected).abs() < 1e-9, "{information}: {cost}");
         }
         assert_eq!(along_x(3.0, 0.0).cost(), 0.0);
-    }
-
-    #[test]
-    fn a_narrower_prior_gains_only_where_pictures_measure() {
-        let gained = |information: f64| -along_x(0.0, information).density_nats(0.5);
-        assert!((gained(1e9) - 2f64.ln()).abs() < 1e-6);
-        assert!((gained(1.0) - 0.5 * (5.0f64 / 2.0).ln()).abs() < 1e-12);
-        assert!(gained(1e-6) < 1e-5);
     }
 
     /// A pose whose effect an exposure has as well is not measured.
