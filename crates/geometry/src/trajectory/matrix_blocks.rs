@@ -6,7 +6,7 @@ use std::borrow::Cow;
 /// Rows of a 4 × 4 matrix.
 const ROWS: usize = 4;
 
-/// A text of nothing but 4 × 4 matrices whose rows are lines of their own, with each matrix on the
+/// A text of nothing but several 4 × 4 matrices whose rows are lines of their own, with each matrix on the
 /// line of its first row; numbers in brackets without these. Other texts, and the numbers of lines,
 /// stay.
 pub(super) fn on_one_line(text: &str) -> Cow<'_, str> {
@@ -40,7 +40,8 @@ fn rows(text: &str) -> Option<Vec<(usize, Vec<&str>)>> {
     };
     let mut matrices = rows.chunks(ROWS);
     let are_matrices = rows.len() == count
-        && count > 0
+        // A single matrix is one of a folder of such files, or a mount.
+        && count > ROWS
         && matrices.all(|matrix| matrix.len() == ROWS && is_last(&matrix[ROWS - 1].1));
     are_matrices.then_some(rows)
 }
@@ -72,7 +73,7 @@ mod tests {
         assert_eq!(on_one_line(&format!("{BLOCK}\n{BLOCK}")), expected);
         let printed = "[[1. 0. 0. 5.]\n [0. 1. 0. 6.]\n [0. 0. 1. 7.]\n [0. 0. 0. 1.]]\n";
         let expected = format!("{}\n\n\n\n", LINE.replace(' ', ". ") + ".");
-        assert_eq!(on_one_line(printed), expected);
+        assert_eq!(on_one_line(&printed.repeat(2)), expected.repeat(2));
     }
 
     #[test]
@@ -81,6 +82,7 @@ mod tests {
             "",
             "1 0 0 5\n0 1 0 6\n",
             "0 0 0 0 0 0 0 1\n",
+            BLOCK,
             "1 2 3 4\n1 2 3 4\n1 2 3 4\n1 2 3 4\n",
             "[{\"shots\": {}}]",
         ] {
