@@ -4,8 +4,8 @@ use super::frame_file::FrameFile;
 use crate::persist::provenance::{self, HashError, Input};
 use std::path::Path;
 
-/// Hashes the frames of a survey, in their order, or the video, the recording or the TIFF files that
-/// they are in.
+/// Hashes the frames of a survey, in their order, or the video, the recording or the TIFF files
+/// that they are in.
 ///
 /// # Errors
 /// [`HashError`] of the first that cannot be read.

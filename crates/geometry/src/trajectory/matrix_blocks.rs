@@ -6,9 +6,9 @@ use std::borrow::Cow;
 /// Rows of a 4 × 4 matrix.
 const ROWS: usize = 4;
 
-/// A text of nothing but several 4 × 4 matrices whose rows are lines of their own, with each matrix on the
-/// line of its first row; numbers in brackets without these. Other texts, and the numbers of lines,
-/// stay.
+/// A text of nothing but several 4 × 4 matrices whose rows are lines of their own, with each matrix
+/// on the line of its first row; numbers in brackets without these. Other texts, and the numbers of
+/// lines, stay.
 pub(super) fn on_one_line(text: &str) -> Cow<'_, str> {
     let text = without_brackets(text);
     let Some(rows) = rows(&text) else {

@@ -66,8 +66,8 @@ impl Found<'_> {
 /// prior ([`crate::tracking::innovation`]), and, with another camera, by how much better it
 /// correlates. A reading is taken if three
 /// quarters of the pairs fit and speak for it, and its odds exceed the number of readings over the
-/// survey's rate of false alarms, by more than pairs scatter. There may be several: poses exactly as planned, seen from the
-/// tunnel's other end, are those of another convention.
+/// survey's rate of false alarms, by more than pairs scatter. There may be several: poses exactly
+/// as planned, seen from the tunnel's other end, are those of another convention.
 ///
 /// Poses of other frames are compared by the pairs that tell them ([`telling_pairs`]), all other
 /// readings by pairs that are evenly distributed.
