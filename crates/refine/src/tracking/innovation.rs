@@ -3,8 +3,8 @@
 //! Pictures measure the pose of a frame with an information J that is small, or zero, in weak
 //! directions: a small rotation looks like a small translation. There the estimate stays where the
 //! prior predicts it, whatever the prior. So the estimate's deviation `½ eᵀΣ⁻¹e` does not tell
-//! priors apart, but the innovation does: the displacement `m = e + J⁻¹Σ⁻¹e` that the pictures alone
-//! ask for has the covariance `Σ + J⁻¹`.
+//! priors apart, but the innovation does: the displacement `m = e + J⁻¹Σ⁻¹e` that the pictures
+//! alone ask for has the covariance `Σ + J⁻¹`.
 //!
 //! Source: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, "Estimation with Applications to Tracking and
 //! Navigation", 2001, 5.2.3 (innovation and its covariance).
