@@ -185,7 +185,6 @@ fn inputs_of(survey: &Survey, folder: &Path) -> Result<Vec<PathBuf>, JobError> {
         match frame.shared_file() {
             Some(file) => {
                 inputs.insert(from_folder(file, folder)?);
-                break;
             }
             None => {
                 let frames = frame.path.parent().unwrap_or(Path::new("."));

@@ -83,6 +83,10 @@ fn jobs_are_described_and_nothing_is_written() {
     let report = job(&report, dir);
     assert!(writes(&report, "report.html") && writes(&report, "report.json"));
     assert_eq!(report["frames"], 4);
+    let view = job(&["view", text(dir), "--port", "0"], dir);
+    assert_eq!(view["may_write"][0], text(&dir.join("marks.geojson")));
+    assert_eq!(view["amount"], "2 layers to draw");
+    assert!(view["memory_bytes"].as_u64().unwrap() > 0);
     let demo = job(&["demo", "--turns", "2", "--out", text(&out)], dir);
     assert!(writes(&demo, "survey") && writes(&demo, "report"));
     assert_eq!(
@@ -135,6 +139,7 @@ fn errors_are_those_of_the_run() {
         (vec!["export", text(dir), "--3dtiles", text(dir)], 2),
         (vec!["simulate", "free", "--out", text(dir)], 3),
         (vec!["converge", "--out", text(&file)], 3),
+        (vec!["view", text(&other)], 3),
     ];
     let there = entries(dir);
     for (command, code) in commands {

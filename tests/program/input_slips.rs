@@ -112,27 +112,195 @@ fn poses_that_fall_to_the_origin_are_named_with_their_frames() {
     assert!(refused.contains("lost the camera"), "{refused}");
 }
 
-#[test]
-fn a_stack_of_pictures_is_refused_with_the_command_that_splits_it() {
-    let survey = first_frames(4);
-    let dir = survey.path();
-    let stack = std::fs::File::create(dir.join("stack.tif")).unwrap();
-    let mut encoder = TiffEncoder::new(stack).unwrap();
-    for grey in 0..4u8 {
-        let page = vec![grey; 480 * 360];
+/// Writes pictures as the pages of a TIFF file.
+fn write_stack(path: &Path, pictures: &[image::GrayImage]) {
+    let mut encoder = TiffEncoder::new(std::fs::File::create(path).unwrap()).unwrap();
+    for picture in pictures {
+        let (width, height) = picture.dimensions();
         encoder
-            .write_image::<colortype::Gray8>(480, 360, &page)
+            .write_image::<colortype::Gray8>(width, height, picture)
             .unwrap();
     }
-    drop(encoder);
-    edit(&dir.join("survey.toml"), "frames/*.jpg", "stack.tif");
+}
+
+/// One stack, and stacks in a folder: the poses are those of the same frames in files.
+#[test]
+fn pages_of_tiff_files_are_frames() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("survey");
+    simulate(&dir, &["--frames", "6", "--size", "160x120"]);
+    let refined = |name: &str| {
+        let out = folder.path().join(name);
+        succeed(&["refine", text(&dir), "--out", text(&out), "--threads", "1"]);
+        std::fs::read(out.join("poses.tum")).unwrap()
+    };
+    let of_files = refined("files");
+    let pictures: Vec<image::GrayImage> = (0..6)
+        .map(|k| {
+            image::open(dir.join(format!("frames/{k:06}.png")))
+                .unwrap()
+                .to_luma8()
+        })
+        .collect();
+    let toml = dir.join("survey.toml");
+    write_stack(&dir.join("stack.tif"), &pictures);
+    edit(&toml, "frames/*.png", "stack.tif");
+    assert!(refined("one") == of_files);
+    std::fs::create_dir(dir.join("stacks")).unwrap();
+    write_stack(&dir.join("stacks/run-2.TIF"), &pictures[..4]);
+    write_stack(&dir.join("stacks/run-10.TIF"), &pictures[4..]);
+    edit(&toml, "stack.tif", "stacks/*");
+    assert!(refined("several") == of_files);
+    let run = std::fs::read_to_string(folder.path().join("several/run.toml")).unwrap();
+    assert!(!run.contains("000000"), "{run}");
+    let whole = std::fs::read(dir.join("stacks/run-2.TIF")).unwrap();
+    // The directory of the last page is cut off: that page is missing.
+    let mut damaged = whole.clone();
+    damaged.truncate(whole.len() - 8);
+    std::fs::write(dir.join("stacks/run-2.TIF"), &damaged).unwrap();
+    let said = fail(&["check", text(&dir)], 3);
+    assert!(said.contains("6 poses for 5 frames"), "{said}");
+}
+
+/// Files of other kinds in place of poses and frames, and tables that are nearly right.
+#[test]
+fn what_people_save_is_read_or_named_with_its_remedy() {
+    let survey = first_frames(4);
+    let dir = survey.path();
+    let file = dir.join("baseline.tum");
+    let right = std::fs::read_to_string(&file).unwrap();
+    let lines: Vec<&str> = right.lines().collect();
+    let without_times: Vec<&str> = lines.iter().map(|l| l.split_once(' ').unwrap().1).collect();
+    let without_times = without_times.join("\n");
+    let lfs = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+    for (content, expected) in [
+        (
+            format!("{right}{right}"),
+            "baseline.tum:5: timestamp 0 after 3: the file has several",
+        ),
+        (
+            without_times.clone(),
+            "a first line `tx ty tz qx qy qz qw` says so",
+        ),
+        (
+            lfs.to_owned(),
+            "baseline.tum: is a pointer of Git LFS in place of the file; `git lfs pull`",
+        ),
+        (
+            "<!DOCTYPE html><html></html>".to_owned(),
+            "baseline.tum: is a web page",
+        ),
+        (
+            format!("Tunnel A,,,,,,,\n{right}"),
+            "baseline.tum:1: column 2 is empty; ",
+        ),
+    ] {
+        std::fs::write(&file, content).unwrap();
+        let refused = fail(&["check", text(dir)], 3);
+        assert!(refused.contains(expected), "{expected}: {refused}");
+    }
+    let toml = dir.join("survey.toml");
+    edit(&toml, "[poses]", "[poses]\nassociate = \"order\"");
+    let read = || {
+        let out = dir.join("read.tum");
+        let convert = ["convert", text(dir), "--poses", "initial", "--to", "tum"];
+        succeed(&[&convert[..], &["--out", text(&out)]].concat());
+        tum::read(&out).unwrap()
+    };
+    std::fs::write(&file, &right).unwrap();
+    let expected = read();
+    std::fs::write(&file, format!("tx ty tz qx qy qz qw\n{without_times}\n")).unwrap();
+    assert_eq!(read().len(), 4);
+    // Matrices as a program prints them, row by row.
+    let matrices: String = expected
+        .iter()
+        .map(|stamped| {
+            let matrix = stamped.pose.r_wc.to_rotation_matrix();
+            let (r, t) = (matrix.matrix(), stamped.pose.t_wc);
+            let row = |k: usize| format!("[{} {} {} {}]\n", r[(k, 0)], r[(k, 1)], r[(k, 2)], t[k]);
+            format!("[{} {} {}[0. 0. 0. 1.]]\n", row(0), row(1), row(2))
+        })
+        .collect();
+    std::fs::write(&file, matrices).unwrap();
+    for (read, expected) in read().iter().zip(&expected) {
+        assert!(read.pose.r_wc.angle_to(&expected.pose.r_wc) < 1e-9);
+        assert!((read.pose.t_wc - expected.pose.t_wc).norm() < 1e-9);
+    }
+    std::fs::write(&file, &right).unwrap();
+    edit(&toml, "frames/*.jpg", "~/frames/*.jpg");
     let refused = fail(&["check", text(dir)], 3);
-    let expected = "stack.tif: a TIFF file of 4 pages";
-    assert!(refused.contains(expected), "{refused}");
+    assert!(refused.contains("write the whole path"), "{refused}");
+    edit(&toml, "~/frames/*.jpg", "frames/*.jpg");
+    std::fs::write(dir.join("frames/000002.jpg"), lfs).unwrap();
+    let refused = fail(&["check", text(dir)], 3);
     assert!(
-        refused.contains("`convert stack.tif frame-%06d.png`"),
+        refused.contains("000002.jpg): it is a pointer of Git LFS"),
         "{refused}"
     );
+}
+
+/// macOS writes accents as characters of their own; tables of numbers write counters with a point.
+#[test]
+fn names_with_accents_and_counters_with_points_are_associated() {
+    let survey = first_frames(4);
+    let dir = survey.path();
+    let poses = tum::read(&dir.join("baseline.tum")).unwrap();
+    let table = |name: &dyn Fn(usize) -> String| {
+        let row = |(k, stamped): (usize, &StampedPose)| {
+            let (t, q) = (stamped.pose.t_wc, stamped.pose.r_wc.coords);
+            let numbers = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(|value| value.to_string());
+            format!("{},{}\n", name(k), numbers.join(","))
+        };
+        let rows: String = poses.iter().enumerate().map(row).collect();
+        std::fs::write(
+            dir.join("p.csv"),
+            format!("frame,tx,ty,tz,qx,qy,qz,qw\n{rows}"),
+        )
+        .unwrap();
+    };
+    edit(&dir.join("survey.toml"), "baseline.tum", "p.csv");
+    table(&|k| format!("{k}.0"));
+    succeed(&["check", text(dir)]);
+    for k in 0..4 {
+        let name = format!("frames/Tu\u{308}bbing {k}.jpg");
+        std::fs::rename(dir.join(format!("frames/{k:06}.jpg")), dir.join(name)).unwrap();
+    }
+    table(&|k| format!("T\u{fc}bbing {k}.jpg"));
+    succeed(&["check", text(dir)]);
+}
+
+/// Surveys whose pictures hardly measure positions: where the radius used to be named.
+#[test]
+fn right_surveys_with_weak_pictures_get_no_advice() {
+    let folder = tempfile::tempdir().unwrap();
+    let frames = ["--frames", "24", "--size", "240x180", "--wall", "concrete"];
+    for (name, options) in [
+        (
+            "overlap",
+            &["--turn-deg", "55", "--advance-m", "0.02", "--seed", "11"][..],
+        ),
+        (
+            "blur",
+            &[
+                "--motion-blur-px",
+                "6",
+                "--defocus-px",
+                "2",
+                "--seed",
+                "111",
+            ],
+        ),
+        (
+            "noise",
+            &["--radius-m", "1", "--noise", "6", "--seed", "541"],
+        ),
+    ] {
+        let survey = folder.path().join(name);
+        simulate(&survey, &[&frames[..], options].concat());
+        let said = succeed(&["check", text(&survey), "--json"]);
+        let check: Value = serde_json::from_str(&said).unwrap();
+        assert_eq!(check["readings"], Value::Null, "{name}");
+    }
 }
 
 /// Degrees that are declared as radians: only the pictures tell.

@@ -81,6 +81,31 @@ fn a_pinhole_declared_as_another_lens_is_named() {
     assert!(said.iter().any(|line| line.contains(expected)), "{said:?}");
 }
 
+/// A list of coefficients in the order of another program.
+#[test]
+fn coefficients_in_another_order_are_named() {
+    let values = json!({"k1": -0.2, "k2": 0.1, "k3": -0.06, "p1": 0.01, "p2": -0.015});
+    let right = calibration("brown-conrady", 80.0, &values);
+    let folder = taken_with(&right);
+    let survey = folder.path().join("survey");
+    assert_eq!(readings(&survey, &right), Value::Null);
+    for (wrong, expected) in [
+        (
+            json!({"k1": -0.2, "k2": 0.1, "p1": -0.06, "p2": 0.01, "k3": -0.015}),
+            "given as k1 k2 k3 p1 p2 (k1 = -0.2, k2 = 0.1, k3 = -0.06, p1 = 0.01, p2 = -0.015 in \
+             camera.json)",
+        ),
+        (
+            json!({"k1": -0.2, "k2": 0.1, "k3": 0.01, "p1": -0.015, "p2": -0.06}),
+            "given as OpenCV's k1 k2 p1 p2 k3 (k1 = -0.2, k2 = 0.1, k3 = -0.06, p1 = 0.01, p2 = \
+             -0.015 in camera.json)",
+        ),
+    ] {
+        let said = readings(&survey, &calibration("brown-conrady", 80.0, &wrong));
+        assert!(said.to_string().contains(expected), "{said}");
+    }
+}
+
 /// A principal point in the corner, one with its coordinates swapped, and a wrong fy.
 #[test]
 fn intrinsics_that_do_not_fit_the_picture_are_named() {

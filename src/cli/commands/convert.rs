@@ -75,8 +75,9 @@ pub fn run(
         .find(|frame| frame.shared_file().is_some() && !frame.is_in_video() && has_names);
     if let Some(frame) = recorded {
         terminal.warn(format!(
-            "the frames are images of a recording, named {} and so on; other programs need them \
-             as files of these names",
+            "the frames are in {}, named {} and so on; other programs need them as files of \
+             these names",
+            printed(frame.file()),
             printed(&frame.path)
         ));
     }

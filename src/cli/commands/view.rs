@@ -1,16 +1,17 @@
 //! `tunnelstitch view`: shows the tunnel in the browser.
 
 use crate::cli::arguments::{LayerArguments, PosesArguments, TextureArguments};
-use crate::cli::output::{Failure, Terminal, json};
+use crate::cli::output::{DryRunArguments, Failure, Job, Terminal, json};
 use crate::files::limits::MAX_REPORT_BYTES;
 use crate::files::{printed, read_text};
 use crate::inspect::{
-    MANIFEST, Marks, Server, ServerContent, Viewer, draw_layers, pose_source_frames,
+    MANIFEST, MARKS_CSV, MARKS_GEOJSON, Marks, PosedLayer, Server, ServerContent, Viewer,
+    draw_layers, plan_layers, pose_source_frames,
 };
 use crate::persist::atomic::ScratchFolder;
 use crate::render::PanoramaJob;
 use crate::report::REFINEMENT_FILE;
-use crate::survey::SURVEY_FILE;
+use crate::survey::{SURVEY_FILE, Survey};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -52,6 +53,8 @@ pub struct ViewArguments {
     layers: LayerArguments,
     #[command(flatten)]
     textures: TextureArguments,
+    #[command(flatten)]
+    dry_run: DryRunArguments,
 }
 
 /// Runs the command.
@@ -67,6 +70,14 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
             source_frames: None,
             marks: Marks::open(&arguments.survey)?,
         };
+        if arguments.dry_run.is_set() {
+            let job = Job {
+                reads: vec![arguments.survey.join(MANIFEST)],
+                may_write: mark_files(&arguments.survey),
+                ..Job::default()
+            };
+            return describe(served, job, arguments, terminal);
+        }
         return serve(served, arguments, terminal);
     }
     let (survey, poses) = match refined_folder(&arguments.survey)? {
@@ -77,6 +88,16 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
     let (survey, layers) = arguments.layers.select(&survey, &poses, opened)?;
     let layers: Vec<_> = layers.into_iter().map(|(_, layer)| layer).collect();
     let marks = Marks::open(&survey.folder)?;
+    if arguments.dry_run.is_set() {
+        let job = job(&survey, &layers, arguments, poses.file())?;
+        let served = ServerContent {
+            folder: survey.folder,
+            viewer,
+            source_frames: None,
+            marks,
+        };
+        return describe(served, job, arguments, terminal);
+    }
     let scratch = ScratchFolder::inside(&std::env::temp_dir())?;
     draw_layers(
         &survey,
@@ -93,6 +114,46 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
         marks,
     };
     serve(served, arguments, terminal)
+}
+
+/// The work before the page is served.
+///
+/// # Errors
+/// Poses that cannot be placed on the wall, too little memory.
+fn job(
+    survey: &Survey,
+    layers: &[PosedLayer],
+    arguments: &ViewArguments,
+    poses: Option<&Path>,
+) -> Result<Job, Failure> {
+    let options = arguments.textures.options();
+    Ok(Job {
+        may_write: mark_files(&survey.folder),
+        amount: Some(format!("{} layers to draw", layers.len())),
+        memory_bytes: Some(plan_layers(survey, layers, &options)?),
+        ..Job::of(survey, poses)
+    })
+}
+
+/// The files of marks in a folder.
+fn mark_files(folder: &Path) -> Vec<PathBuf> {
+    [MARKS_GEOJSON, MARKS_CSV]
+        .map(|name| folder.join(name))
+        .to_vec()
+}
+
+/// Prints the work, for `--dry-run`, once the port is known to be free.
+///
+/// # Errors
+/// A port that is in use.
+fn describe(
+    served: ServerContent,
+    job: Job,
+    arguments: &ViewArguments,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    Server::listen(served, arguments.port)?;
+    job.print(terminal)
 }
 
 /// Finds the survey and the poses of a folder that `refine` has written; `None` for other folders.

@@ -2,12 +2,15 @@
 
 use super::error::FrameError;
 use super::frame_file::{FrameFile, FrameSource};
-use super::picture_decoder::{Content, Input, decoder, open_picture};
-use super::picture_end::{is_jpeg, jpeg_is_complete, truncated, truncation};
+use super::picture_decoder::{Content, Input, decoder, open_input};
+use super::picture_end::{is_jpeg, jpeg_is_complete, page_truncation, truncated, truncation};
 use super::picture_reading::{PictureOrientation, PictureReading};
 use super::recorded_images::{RecordedImage, RecordedImages};
+use super::tiff_stack::PageFile;
 use image::metadata::Orientation;
-use image::{ColorType, DynamicImage, GrayImage, ImageDecoder, RgbImage};
+use image::{ColorType, DynamicImage, GrayImage, ImageDecoder, ImageError, RgbImage};
+use std::io::{self, BufReader};
+use std::path::Path;
 
 impl FrameFile {
     /// Width and height, pixels, from the file's header; those of the picture as it is read.
@@ -31,7 +34,7 @@ impl FrameFile {
                 };
                 Ok(turned_size(size, reading.orientation.turn(named)))
             }
-            FrameSource::File(reading) => {
+            FrameSource::File(reading) | FrameSource::Page(_, _, reading) => {
                 let mut header = self.header()?;
                 let turn = reading.orientation.turn(orientation(&mut header));
                 Ok(turned_size(header.dimensions(), turn))
@@ -45,10 +48,12 @@ impl FrameFile {
     /// A missing, truncated or unknown file; a size other than `(width, height)`.
     pub fn examine(&self, width: u32, height: u32) -> Result<(), FrameError> {
         self.check_size(self.size()?, (width, height))?;
-        if !matches!(self.source, FrameSource::File(_)) {
-            return Ok(());
-        }
-        match truncation(&self.path) {
+        let truncation = match &self.source {
+            FrameSource::File(_) => truncation(&self.path),
+            FrameSource::Page(stack, directory, _) => page_truncation(stack, *directory),
+            _ => return Ok(()),
+        };
+        match truncation {
             Ok(None) => Ok(()),
             Ok(Some(what)) => Err(self.decode_error(what)),
             Err(error) => Err(self.decode_error(error.to_string())),
@@ -86,7 +91,7 @@ impl FrameFile {
     /// A missing or unknown file.
     pub fn exif_orientation(&self) -> Result<Option<u8>, FrameError> {
         let named = match &self.source {
-            FrameSource::File(_) => orientation(&mut self.header()?),
+            FrameSource::File(_) | FrameSource::Page(..) => orientation(&mut self.header()?),
             FrameSource::Recording(images, image, _) => match self.recorded(images, *image)? {
                 RecordedImage::Pixels(_) => return Ok(None),
                 RecordedImage::File(content) => orientation(&mut self.content_header(&content)?),
@@ -106,10 +111,24 @@ impl FrameFile {
         decoder(content.input()).map_err(|error| self.picture_error(&error))
     }
 
-    /// The decoder of a picture file after reading its header.
+    /// The decoder of a picture file, or a page of one, after reading its header.
     fn header(&self) -> Result<impl ImageDecoder, FrameError> {
-        open_picture(&self.path).map_err(|error| self.picture_error(&error))
+        let input = match &self.source {
+            FrameSource::Page(stack, directory, _) => page_input(stack, *directory),
+            _ => open_input(&self.path),
+        };
+        let input = input.map_err(ImageError::IoError);
+        input
+            .and_then(decoder)
+            .map_err(|error| self.picture_error(&error))
     }
+}
+
+/// The input of a page of a TIFF file.
+fn page_input(stack: &Path, directory: u64) -> io::Result<Input> {
+    Ok(Input::Page(BufReader::new(PageFile::open(
+        stack, directory,
+    )?)))
 }
 
 /// The EXIF orientation; none if the file has none that can be read.
@@ -154,6 +173,10 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
                 }
             };
         }
+        FrameSource::Page(stack, directory, reading) => {
+            let input = || page_input(stack, *directory);
+            return decode_input(file, input, reading, (width, height));
+        }
         FrameSource::File(reading) => reading,
     };
     let content =
@@ -171,19 +194,33 @@ fn decode_file(
     reading: &PictureReading,
     (width, height): (u32, u32),
 ) -> Result<DynamicImage, FrameError> {
-    let check = |found| file.check_size(found, (width, height));
-    let fail = |what: String| file.decode_error(what);
     let bytes = content.as_ref();
     if is_jpeg(bytes) && !jpeg_is_complete(bytes) {
-        return Err(fail(truncated("JPEG")));
+        return Err(file.decode_error(truncated("JPEG")));
     }
+    decode_input(file, || Ok(content.input()), reading, (width, height))
+}
+
+/// Decodes what `input` gives, from its start, and checks its size.
+///
+/// # Errors
+/// The errors of [`load_colour`].
+fn decode_input(
+    file: &FrameFile,
+    input: impl Fn() -> io::Result<Input>,
+    reading: &PictureReading,
+    (width, height): (u32, u32),
+) -> Result<DynamicImage, FrameError> {
+    let check = |found| file.check_size(found, (width, height));
+    let fail = |what: String| file.decode_error(what);
+    let open = || input().map_err(|error| fail(error.to_string()));
     if reading.orientation == PictureOrientation::Stored
-        && let Some(picture) = plain_tiff(content.input(), width, height)
+        && let Some(picture) = plain_tiff(open()?, width, height)
     {
         return Ok(picture);
     }
     let refuse = |error| file.picture_error(&error);
-    let mut decoder = decoder(content.input()).map_err(refuse)?;
+    let mut decoder = decoder(open()?).map_err(refuse)?;
     let turn = reading.orientation.turn(orientation(&mut decoder));
     // Checked before allocating the memory that the header claims.
     check(turned_size(decoder.dimensions(), turn))?;
@@ -233,7 +270,7 @@ pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
             RecordedImage::Pixels(pixels) => Ok(pixels.color()),
             RecordedImage::File(content) => Ok(file.content_header(&content)?.color_type()),
         },
-        FrameSource::File(_) => Ok(file.header()?.color_type()),
+        FrameSource::File(_) | FrameSource::Page(..) => Ok(file.header()?.color_type()),
     }
 }
 

@@ -3,21 +3,28 @@
 use super::error::FrameError;
 use super::picture_reading::PictureReading;
 use super::recorded_images::RecordedImages;
+use super::tiff_stack;
 use super::unmatched_pattern;
 use super::unread_format::UnreadFormat;
 use super::video::Video;
 use alphanumeric_sort::compare_str;
 use image::error::ImageFormatHint;
 use image::{DynamicImage, ImageError};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tunnelstitch_geometry::files::printed;
+use tunnelstitch_geometry::files::{git_lfs_pointer, open_regular, printed};
+
+/// Bytes of a file that tell a pointer of Git LFS.
+const POINTER_BYTES: u64 = 64;
 
 /// The place that a frame's pixels come from.
 #[derive(Clone, Debug)]
 pub(super) enum FrameSource {
     /// A file of its own, [`FrameFile::path`].
     File(PictureReading),
+    /// A TIFF file, the place of the page's directory in it, and its reading.
+    Page(Arc<Path>, u64, PictureReading),
     /// A video, and the index of the picture.
     Video(Arc<Video>, usize),
     /// A recording, the number of the image, and its reading.
@@ -26,14 +33,16 @@ pub(super) enum FrameSource {
     Memory(Arc<DynamicImage>),
 }
 
-/// A frame in a file of its own, in a video, in a recording, or in memory.
+/// A frame in a file of its own, on a page of a TIFF file, in a video, in a recording, or in
+/// memory.
 #[derive(Clone, Debug)]
 pub struct FrameFile {
     /// Index of the frame in the survey.
     pub index: usize,
     /// Path of the picture, or the video's path followed by the picture's number:
-    /// `survey.mp4/000012`; the recording's with the image's number, `survey.mcap#000012`; a name
-    /// only, for a picture in memory.
+    /// `survey.mp4/000012`; that of a TIFF file likewise by its page, `survey.tif/000012`; the
+    /// recording's with the image's number, `survey.mcap#000012`; a name only, for a picture in
+    /// memory.
     pub path: PathBuf,
     /// Its pixels.
     pub(super) source: FrameSource,
@@ -54,7 +63,10 @@ impl FrameFile {
 
     /// The frame with its picture file or recorded image read as given; no other frame changes.
     pub fn with_reading(mut self, reading: PictureReading) -> Self {
-        if let FrameSource::File(own) | FrameSource::Recording(_, _, own) = &mut self.source {
+        if let FrameSource::File(own)
+        | FrameSource::Page(_, _, own)
+        | FrameSource::Recording(_, _, own) = &mut self.source
+        {
             *own = reading;
         }
         self
@@ -63,9 +75,33 @@ impl FrameFile {
     /// The reading of its picture file or recorded image; None for other frames.
     pub fn reading(&self) -> Option<PictureReading> {
         match &self.source {
-            FrameSource::File(reading) | FrameSource::Recording(_, _, reading) => Some(*reading),
+            FrameSource::File(reading)
+            | FrameSource::Page(_, _, reading)
+            | FrameSource::Recording(_, _, reading) => Some(*reading),
             FrameSource::Video(..) | FrameSource::Memory(_) => None,
         }
+    }
+
+    /// The pages of the frame's file, if it is a TIFF file with several as large as the first one;
+    /// otherwise the frame itself.
+    pub fn split_into_pages(self) -> Vec<Self> {
+        let directories = if tiff_stack::is_tiff_name(&self.path) {
+            tiff_stack::directories(&self.path)
+        } else {
+            Vec::new()
+        };
+        if directories.len() < 2 {
+            return vec![self];
+        }
+        let stack: Arc<Path> = self.path.into();
+        let reading = PictureReading::default();
+        let page = |(page, directory): (usize, u64)| Self {
+            index: page,
+            path: stack.join(format!("{page:06}")),
+            source: FrameSource::Page(Arc::clone(&stack), directory, reading),
+            named_from: None,
+        };
+        directories.into_iter().enumerate().map(page).collect()
     }
 
     /// A picture of a video, numbered from 0.
@@ -104,6 +140,7 @@ impl FrameFile {
         match &self.source {
             FrameSource::Video(video, _) => video.path(),
             FrameSource::Recording(images, ..) => images.path(),
+            FrameSource::Page(stack, ..) => stack,
             FrameSource::File(_) | FrameSource::Memory(_) => &self.path,
         }
     }
@@ -118,6 +155,7 @@ impl FrameFile {
         match &self.source {
             FrameSource::Video(video, _) => Some(video.path()),
             FrameSource::Recording(images, ..) => Some(images.path()),
+            FrameSource::Page(stack, ..) => Some(stack),
             FrameSource::File(_) | FrameSource::Memory(_) => None,
         }
     }
@@ -125,7 +163,7 @@ impl FrameFile {
     /// The format of a picture file, if it is one that is not read.
     pub(super) fn unread_format(&self) -> Option<UnreadFormat> {
         match &self.source {
-            FrameSource::File(_) => UnreadFormat::of(&self.path),
+            FrameSource::File(_) | FrameSource::Page(..) => UnreadFormat::of(self.file()),
             _ => None,
         }
     }
@@ -135,10 +173,12 @@ impl FrameFile {
     pub(super) fn decode_error(&self, what: String) -> FrameError {
         if let Some(format) = self.unread_format() {
             let what = format!("{} is not read", format.name());
-            return self.error(what, &format.remedy(&self.path), false);
+            return self.error(what, &format.remedy(self.file()), false);
         }
         match &self.source {
-            FrameSource::File(_) => self.error(what, "restore the file", true),
+            FrameSource::File(_) | FrameSource::Page(..) => {
+                self.error(what, "restore the file", true)
+            }
             FrameSource::Recording(..) => self.error(what, "restore the recording", true),
             FrameSource::Video(..) => self.error(what, "restore the file", false),
             FrameSource::Memory(_) => self.error(what, "leave out the picture and its pose", false),
@@ -149,6 +189,9 @@ impl FrameFile {
     pub(super) fn picture_error(&self, error: &ImageError) -> FrameError {
         let is_empty = std::fs::metadata(self.file())
             .is_ok_and(|metadata| metadata.is_file() && metadata.len() == 0);
+        if let Some(pointer) = self.git_lfs_pointer() {
+            return self.decode_error(format!("it {pointer}"));
+        }
         match error {
             _ if is_empty => self.decode_error("the file is empty".to_owned()),
             ImageError::Unsupported(error) if error.format_hint() == ImageFormatHint::Unknown => {
@@ -160,6 +203,14 @@ impl FrameFile {
             }
             other => self.decode_error(other.to_string()),
         }
+    }
+
+    /// Says that a picture file is a pointer of Git LFS, if it is.
+    fn git_lfs_pointer(&self) -> Option<&'static str> {
+        let file = open_regular(self.file()).ok()?;
+        let mut start = Vec::new();
+        file.take(POINTER_BYTES).read_to_end(&mut start).ok()?;
+        git_lfs_pointer(&start)
     }
 
     fn error(&self, what: String, remedy: &str, can_be_skipped: bool) -> FrameError {

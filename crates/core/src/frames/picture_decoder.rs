@@ -1,5 +1,6 @@
 //! The decoders of picture files, chosen by what the files hold.
 
+use super::tiff_stack::PageFile;
 use image::{ImageDecoder, ImageFormat, ImageReader, ImageResult, Limits};
 use std::cell::RefCell;
 use std::fs::File;
@@ -22,7 +23,15 @@ const MAX_METADATA_BYTES: u64 = 64 << 20;
 /// # Errors
 /// A missing file, or one that is no picture.
 pub fn open_picture(path: &Path) -> ImageResult<impl ImageDecoder + use<>> {
-    decoder(Input::File(BufReader::new(open_regular(path)?)))
+    decoder(open_input(path)?)
+}
+
+/// The input of a file, from its start.
+///
+/// # Errors
+/// A missing file, or what is no regular one.
+pub(super) fn open_input(path: &Path) -> io::Result<Input> {
+    Ok(Input::File(BufReader::new(open_regular(path)?)))
 }
 
 /// The decoder for what an input holds, after reading its header.
@@ -42,6 +51,8 @@ pub(super) enum Input {
     File(BufReader<File>),
     /// The content of a file.
     Content(Cursor<Content>),
+    /// A page of a TIFF file.
+    Page(BufReader<PageFile>),
 }
 
 impl Read for Input {
@@ -49,6 +60,7 @@ impl Read for Input {
         match self {
             Self::File(file) => file.read(buffer),
             Self::Content(content) => content.read(buffer),
+            Self::Page(page) => page.read(buffer),
         }
     }
 }
@@ -58,6 +70,7 @@ impl BufRead for Input {
         match self {
             Self::File(file) => file.fill_buf(),
             Self::Content(content) => content.fill_buf(),
+            Self::Page(page) => page.fill_buf(),
         }
     }
 
@@ -65,6 +78,7 @@ impl BufRead for Input {
         match self {
             Self::File(file) => file.consume(bytes),
             Self::Content(content) => content.consume(bytes),
+            Self::Page(page) => page.consume(bytes),
         }
     }
 }
@@ -74,6 +88,7 @@ impl Seek for Input {
         match self {
             Self::File(file) => file.seek(to),
             Self::Content(content) => content.seek(to),
+            Self::Page(page) => page.seek(to),
         }
     }
 }

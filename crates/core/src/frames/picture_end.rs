@@ -1,5 +1,7 @@
 //! Recognition of truncated picture files by their ends, without decoding them.
 
+use super::picture_decoder::Input;
+use super::tiff_stack::PageFile;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -46,11 +48,26 @@ pub(super) fn truncation(path: &Path) -> io::Result<Option<String>> {
     } else if start.starts_with(b"RIFF") && start.ends_with(b"WEBP") {
         ("WebP", bytes >= riff_bytes(&start))
     } else if start.starts_with(b"II") || start.starts_with(b"MM") {
-        ("TIFF", tiff_end(file).is_none_or(|end| bytes >= end))
+        file.seek(SeekFrom::Start(0))?;
+        let end = tiff_end(Input::File(BufReader::new(file)));
+        ("TIFF", end.is_none_or(|end| bytes >= end))
     } else {
         return Ok(None);
     };
     Ok((!is_whole).then(|| truncated(format)))
+}
+
+/// Finds out that a TIFF file ends within the page whose directory is at `directory`, as
+/// [`truncation`] does of whole files.
+///
+/// # Errors
+/// An error of the operating system; what is no regular file.
+pub(super) fn page_truncation(path: &Path, directory: u64) -> io::Result<Option<String>> {
+    let page = PageFile::open(path, directory)?;
+    let bytes = page.file_bytes()?;
+    let end = tiff_end(Input::Page(BufReader::new(page)));
+    let is_whole = end.is_none_or(|end| bytes >= end);
+    Ok((!is_whole).then(|| truncated("TIFF")))
 }
 
 /// The sentence about a truncated file of a format.
@@ -78,9 +95,8 @@ fn riff_bytes(start: &[u8]) -> u64 {
 
 /// The end of the last strip or tile of a TIFF file's first picture; None where the decoder does
 /// not understand it.
-fn tiff_end(mut file: File) -> Option<u64> {
-    file.seek(SeekFrom::Start(0)).ok()?;
-    let mut decoder = tiff::decoder::Decoder::new(BufReader::new(file)).ok()?;
+fn tiff_end(input: Input) -> Option<u64> {
+    let mut decoder = tiff::decoder::Decoder::new(input).ok()?;
     let (offsets, sizes) = match decoder.find_tag(Tag::TileOffsets).ok()? {
         Some(_) => (Tag::TileOffsets, Tag::TileByteCounts),
         None => (Tag::StripOffsets, Tag::StripByteCounts),

@@ -10,6 +10,9 @@ const MAX_NAMED: usize = 3;
 /// A hint, with `; ` in front, for a pattern of files (with slashes, relative to `folder`) that
 /// matches none: that there is no such folder, or which files there are instead.
 pub(super) fn hint(folder: &Path, pattern: &str) -> String {
+    if pattern.starts_with("~/") {
+        return "; `~` does not stand for the home folder here: write the whole path".to_owned();
+    }
     let (parent, name) = pattern.rsplit_once('/').unwrap_or(("", pattern));
     let whole = folder.join(pattern);
     let (shown, searched) = match whole.is_dir() {

@@ -11,6 +11,7 @@ use std::ffi::OsStr;
 use std::path::Path;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::trajectory::{PoseEntry, PoseFile, StampedPose, Trajectory, se3};
+use unicode_normalization::UnicodeNormalization;
 
 /// The criterion by which poses are associated with frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -175,7 +176,7 @@ impl<'a> PosesByName<'a> {
             stem: HashMap::new(),
         };
         for entry in &file.entries {
-            let name = entry.name.as_deref().unwrap_or_default().replace('\\', "/");
+            let name = composed(entry.name.as_deref().unwrap_or_default()).replace('\\', "/");
             let base = name.rsplit('/').next().unwrap_or_default().to_owned();
             let lower = base.to_lowercase();
             let add = |poses: &mut HashMap<String, Vec<NamedPose<'a>>>, key: String| {
@@ -194,7 +195,7 @@ impl<'a> PosesByName<'a> {
 
     /// The poses whose names are most like that of a frame.
     fn of_frame(&self, frame: &FrameFile) -> &[NamedPose<'a>] {
-        let text = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+        let text = |part: Option<&OsStr>| composed(&part.unwrap_or_default().to_string_lossy());
         let (name, stem) = (text(frame.path.file_name()), text(frame.path.file_stem()));
         let found = (self.exact.get(&name))
             .or_else(|| self.exact.get(&stem))
@@ -203,6 +204,12 @@ impl<'a> PosesByName<'a> {
             .or_else(|| self.stem.get(&stem.to_lowercase()));
         found.map_or(&[], Vec::as_slice)
     }
+}
+
+/// A name with its accents in the letters: macOS writes some names of files with accents of their
+/// own.
+fn composed(name: &str) -> String {
+    name.nfc().collect()
 }
 
 /// A path without its root and `.` components.

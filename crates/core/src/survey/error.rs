@@ -3,7 +3,7 @@
 use crate::frames::FrameError;
 use crate::points::PointsError;
 use crate::storage::StorageError;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tunnelstitch_geometry::camera::CalibrationError;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::surface::SurfaceError;
@@ -86,20 +86,6 @@ pub enum SurveyError {
         frame: usize,
         /// The frame.
         file: PathBuf,
-    },
-    /// The only file of frames has several pages.
-    #[error(
-        "{}: a TIFF file of {pages} pages, and each frame is a file of its own; `convert {} \
-         frame-%06d.png` (ImageMagick) writes them beside it, and images under [frames] that end \
-         in frame-*.png take them",
-        printed(path),
-        printed(path.file_name().map_or(path.as_path(), Path::new))
-    )]
-    Pages {
-        /// The file.
-        path: PathBuf,
-        /// Number of pages of the size of the first.
-        pages: usize,
     },
     /// There is no frame.
     #[error("there is no frame")]

@@ -87,18 +87,11 @@ fn check_video(section: &FramesSection) -> Result<usize, &'static str> {
     interval(section)
 }
 
-/// Refuses a single file with several pages.
-fn check_pages(listed: &[FrameFile]) -> Result<(), SurveyError> {
-    let [only] = listed else {
-        return Ok(());
-    };
-    match frames::count_pages(only.file()) {
-        0 | 1 => Ok(()),
-        pages => Err(SurveyError::Pages {
-            path: only.file().to_owned(),
-            pages,
-        }),
-    }
+/// The frames of files, of which TIFF files with several pages contain as many.
+fn split_into_pages(files: Vec<FrameFile>) -> Vec<FrameFile> {
+    let split = files.par_map(|file| file.clone().split_into_pages());
+    let frames = split.into_iter().flatten().enumerate();
+    frames.map(|(index, frame)| frame.numbered(index)).collect()
 }
 
 impl FrameList {
@@ -132,8 +125,7 @@ impl FrameList {
                 let fetched = stored.map(|url| Mirror::of_user().fetch_pattern(&url));
                 let pattern = fetched.unwrap_or_else(|| Ok(pattern.clone()))?;
                 let listed = frames::list_frames(folder, &pattern, mask.as_deref())?;
-                check_pages(&listed)?;
-                Self::of_images(listed, reading)
+                Self::of_images(split_into_pages(listed), reading)
             }
             (None, Some(video), None) => {
                 let every = check_video(section).map_err(value)?;

@@ -142,7 +142,22 @@ fn remedy(slip: LensSlip, meant: &Lens, folder: &Path, file: &Path) -> String {
             let values = coefficients(meant);
             format!("the inverse of the given radial distortion ({values} in {name})")
         }
+        LensSlip::RadialFirst => in_order("given as k1 k2 k3 p1 p2", meant, file),
+        LensSlip::TangentialInside => in_order("given as OpenCV's k1 k2 p1 p2 k3", meant, file),
+        LensSlip::TangentialSwapped => in_order("given with p2 before p1", meant, file),
     }
+}
+
+/// Coefficients that are `given` in another order than they are read in, and their values by name;
+/// a file that lists them without names has OpenCV's order.
+fn in_order(given: &str, meant: &Lens, file: &Path) -> String {
+    let (values, name) = (coefficients(meant), file.display());
+    let extension = file.extension().unwrap_or_default().to_string_lossy();
+    let order = match &*extension.to_lowercase() {
+        "yaml" | "yml" | "xml" => ", in the order k1 k2 p1 p2 k3",
+        _ => "",
+    };
+    format!("distortion coefficients that are {given} ({values} in {name}{order})")
 }
 
 /// The entry of a calibration file that names the model of a lens.

@@ -13,7 +13,7 @@ pub struct PictureGroup {
     pub pattern: String,
     /// The first picture, relative to the searched folder.
     pub first: PathBuf,
-    /// Number of pictures.
+    /// Number of pictures; of TIFF files with several pages, that of these.
     pub count: usize,
     /// True if the name of the first picture has its time.
     pub names_time: bool,
@@ -40,6 +40,13 @@ impl PictureGroup {
             .unwrap_or_default();
         let names_time = times::from_name(&stem.to_string_lossy(), None).is_some();
         let first = FrameFile::picture(0, path.unwrap_or_default());
+        let frame = |file: &&PathBuf| FrameFile::picture(0, folder.join(file));
+        let pages = |file: &&PathBuf| frame(file).split_into_pages().len();
+        // Stacks are of one kind: a folder of single pages is not opened file by file.
+        let frames = match files.first().map(pages) {
+            None | Some(1) => files.len(),
+            Some(_) => files.iter().map(pages).sum(),
+        };
         let size = first.size();
         let is_turned = first.exif_orientation().is_ok_and(|named| named.is_some());
         let exif = PictureReading {
@@ -51,7 +58,7 @@ impl PictureGroup {
             first: files
                 .first()
                 .map_or_else(PathBuf::new, |first| first.to_path_buf()),
-            count: files.len(),
+            count: frames,
             names_time,
             fault: size.as_ref().err().map(ToString::to_string),
             size: size.ok(),

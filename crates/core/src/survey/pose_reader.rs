@@ -318,7 +318,14 @@ impl PoseReader<'_> {
 /// True if the names of a file number the frames from 0 or 1, and are not those of pictures.
 fn are_counters(file: &PoseFile, frames: &[FrameFile]) -> bool {
     let names = file.entries.iter().map(|entry| entry.name.as_deref());
-    let numbers = names.map(|name| name?.parse::<usize>().ok());
+    let numbers = names.map(|name| {
+        let name = name?;
+        // Tables of numbers alone write `3.0`.
+        name.strip_suffix(".0")
+            .unwrap_or(name)
+            .parse::<usize>()
+            .ok()
+    });
     let Some(numbers) = numbers.collect::<Option<Vec<usize>>>() else {
         return false;
     };

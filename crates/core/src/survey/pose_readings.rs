@@ -70,9 +70,8 @@ pub struct PoseReading {
     pub camera: CameraReading,
     /// Places by which the poses belong to later frames than given; earlier if it is negative.
     pub shift_frames: isize,
-    /// Factor of the errors of positions, at most 1: wider ones would excuse what the prior as
-    /// given does not.
-    pub error_scale: f64,
+    /// Radius of the tunnel over the one given.
+    pub radius_factor: f64,
 }
 
 impl PoseReading {
@@ -86,8 +85,19 @@ impl PoseReading {
             orientation: PictureOrientation::Stored,
             camera: CameraReading::AsGiven,
             shift_frames: 0,
-            error_scale: 1.0,
+            radius_factor: 1.0,
         }
+    }
+
+    /// True if the reading has another radius than given.
+    pub fn changes_radius(&self) -> bool {
+        self.radius_factor != 1.0
+    }
+
+    /// Factor of the errors of positions in the tunnel of the given radius, at most 1: wider ones
+    /// would excuse what the prior as given does not.
+    pub fn error_scale(&self) -> f64 {
+        self.radius_factor.recip().min(1.0)
     }
 
     /// True if the reading has another camera than given.
@@ -191,7 +201,7 @@ impl Survey {
             let initial = self.initial.iter().map(scaled).collect();
             let reading = PoseReading {
                 prior_nats,
-                error_scale: (1.0 / factor).min(1.0),
+                radius_factor: factor,
                 ..PoseReading::of_poses(remedy, 1, initial)
             };
             is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)

@@ -15,15 +15,24 @@ pub enum LensSlip {
     OppositeSign,
     /// The radial coefficients remove the distortion instead of making it.
     Inverse,
+    /// k1 k2 k3 p1 p2, as Metashape writes them, are given as OpenCV's k1 k2 p1 p2 k3.
+    RadialFirst,
+    /// OpenCV's k1 k2 p1 p2 k3 are given as k1 k2 k3 p1 p2.
+    TangentialInside,
+    /// p1 and p2 are given for each other.
+    TangentialSwapped,
 }
 
 impl LensSlip {
     /// All slips.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 7] = [
         Self::FisheyeAsPinhole,
         Self::PinholeAsFisheye,
         Self::OppositeSign,
         Self::Inverse,
+        Self::RadialFirst,
+        Self::TangentialInside,
+        Self::TangentialSwapped,
     ];
 
     /// The lens that was meant by `given`; None if that cannot be this slip.
@@ -88,17 +97,21 @@ fn of_polynomial(slip: LensSlip, given: &BrownCoefficients) -> Option<BrownCoeff
     let [k1, k2, k3, 0.0, 0.0, 0.0] = given.k else {
         return None;
     };
-    let [k1, k2, k3] = match slip {
-        LensSlip::OppositeSign => [-k1, -k2, -k3],
+    let [p1, p2] = given.p;
+    let ([k1, k2, k3], p) = match slip {
+        LensSlip::OppositeSign => ([-k1, -k2, -k3], given.p),
         LensSlip::Inverse => {
             let third = 8.0 * k1 * k2 - 12.0 * k1.powi(3) - k3;
-            [-k1, 3.0 * k1 * k1 - k2, third]
+            ([-k1, 3.0 * k1 * k1 - k2, third], given.p)
         }
+        LensSlip::RadialFirst => ([k1, k2, p1], [p2, k3]),
+        LensSlip::TangentialInside => ([k1, k2, p2], [k3, p1]),
+        LensSlip::TangentialSwapped => ([k1, k2, k3], [p2, p1]),
         LensSlip::FisheyeAsPinhole | LensSlip::PinholeAsFisheye => return None,
     };
     Some(BrownCoefficients {
         k: [k1, k2, k3, 0.0, 0.0, 0.0],
-        p: given.p,
+        p,
     })
 }
 
@@ -113,6 +126,20 @@ mod tests {
             k: [k1, k2, k3, 0.0, 0.0, 0.0],
             p,
         })
+    }
+
+    /// A list in one order is read in the other, and back.
+    #[test]
+    fn coefficients_in_another_order_are_put_right() {
+        let right = polynomial([0.1, -0.2, 0.03], [0.004, -0.005]);
+        let as_opencv = polynomial([0.1, -0.2, -0.005], [0.03, 0.004]);
+        assert_eq!(LensSlip::RadialFirst.meant(&as_opencv), Some(right));
+        let of_opencv = polynomial([0.1, -0.2, 0.004], [-0.005, 0.03]);
+        assert_eq!(LensSlip::TangentialInside.meant(&of_opencv), Some(right));
+        let swapped = polynomial([0.1, -0.2, 0.03], [-0.005, 0.004]);
+        assert_eq!(LensSlip::TangentialSwapped.meant(&swapped), Some(right));
+        let radial = polynomial([0.1, -0.2, 0.0], [0.0; 2]);
+        assert_eq!(LensSlip::RadialFirst.meant(&radial), None);
     }
 
     #[test]

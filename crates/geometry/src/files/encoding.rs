@@ -1,5 +1,6 @@
 //! Encodings of text files.
 
+use super::other_content;
 use std::char::decode_utf16;
 
 /// The characters of Windows-1252 from 0x80 to 0x9f; those that it does not define are null.
@@ -18,13 +19,10 @@ const WINDOWS_1252: [char; 32] = [
 /// A sentence that says what else the file is, if it is no text: it contains null or control
 /// characters.
 pub fn decode_text(bytes: &[u8]) -> Result<String, &'static str> {
+    if let Some(kind) = other_content::kind(bytes) {
+        return Err(kind);
+    }
     let text = match bytes {
-        [b'P', b'K', 3, 4, ..] => {
-            return Err(
-                "is a workbook of a spreadsheet or another ZIP archive, not text; save the \
-                 sheet as CSV, or unpack it",
-            );
-        }
         [0xff, 0xfe, rest @ ..] => from_utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => from_utf16(rest, u16::from_be_bytes),
         [0xef, 0xbb, 0xbf, rest @ ..] => str::from_utf8(rest).ok().map(str::to_owned),

@@ -8,6 +8,7 @@
 //! | encodings of text files | [`encoding`] |
 //! | numbers of JSON files | [`json`] |
 //! | largest sizes of text files | [`limits`] |
+//! | files of other kinds in place of a text | [`other_content`] |
 //! | lines and columns of texts | [`place`] |
 //! | files that are locked or appended to, and targets that may be replaced | [`targets`] |
 //! | standard input as a file | [`standard_input`] |
@@ -18,6 +19,7 @@ pub mod binary;
 pub mod encoding;
 pub mod json;
 pub mod limits;
+pub mod other_content;
 pub mod place;
 pub mod printed;
 pub mod regular;
@@ -27,6 +29,7 @@ pub mod xml;
 
 pub use binary::BinaryFile;
 pub use encoding::decode_text;
+pub use other_content::git_lfs_pointer;
 pub use place::line_and_column;
 pub use printed::{escape_controls, printed};
 pub use regular::{open_regular, read_regular, read_text};

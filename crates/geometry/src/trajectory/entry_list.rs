@@ -61,7 +61,7 @@ impl EntryList {
             && let (Some(time_s), Some(last_s)) = (entry.time_s, last.time_s)
         {
             if time_s < last_s {
-                return Err(unordered(time_s, last_s));
+                return Err(unordered(time_s, last_s, self.begins_again(time_s)));
             }
             if time_s == last_s && self.duplicates != DuplicateTimes::Keep {
                 if self.duplicates == DuplicateTimes::Refuse {
@@ -82,17 +82,25 @@ impl EntryList {
         Ok(())
     }
 
+    /// True if a time is that of the first pose, as where a trajectory follows another.
+    fn begins_again(&self, time_s: f64) -> bool {
+        let first = self.parsed.entries.first();
+        self.parsed.entries.len() > 1 && first.and_then(|entry| entry.time_s) == Some(time_s)
+    }
+
     /// The poses.
     pub fn into_parsed(self) -> ParsedPoses {
         self.parsed
     }
 }
 
-/// The error of a time before the last pose's, both seconds.
-fn unordered(time_s: f64, last_s: f64) -> String {
+/// The error of a time before the last pose's, both seconds; `begins_again`: it is the first one's.
+fn unordered(time_s: f64, last_s: f64, begins_again: bool) -> String {
     // A clock of the day that goes back by more than half of it has passed midnight.
     let is_midnight = last_s < DAY_S && last_s - time_s > 0.5 * DAY_S;
-    let remedy = if is_midnight {
+    let remedy = if begins_again {
+        "the file has several trajectories, or one several times: keep one"
+    } else if is_midnight {
         "if the clock began again at midnight, add 86400 to the times from there on"
     } else {
         "sort the file by time"

@@ -1,5 +1,6 @@
 //! KITTI odometry: lines with the twelve numbers of `[R t]`, row by row, camera-to-world, metres;
-//! no times. The sixteen numbers of `[R t; 0 0 0 1]` are read, too.
+//! no times. The sixteen numbers of `[R t; 0 0 0 1]` are read, too, on one line or
+//! on four.
 //!
 //! KITTI's own files use the first camera as their world. Files are read in any world and written
 //! in the tunnel's frame.

@@ -52,6 +52,7 @@ pub mod gyro;
 mod iso_time;
 mod jitter;
 pub mod kitti;
+mod matrix_blocks;
 mod matrix_files;
 mod meshroom;
 mod metashape;

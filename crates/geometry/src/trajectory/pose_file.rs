@@ -9,8 +9,8 @@ use super::pose_entry::PoseEntry;
 use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
 use super::{
-    bundler, colmap, colmap_binary, csv, euroc, kitti, matrix_files, meshroom, metashape,
-    nerfstudio, openmvg, opensfm, pix4d, realitycapture, recorded, text, tum,
+    bundler, colmap, colmap_binary, csv, euroc, kitti, matrix_blocks, matrix_files, meshroom,
+    metashape, nerfstudio, openmvg, opensfm, pix4d, realitycapture, recorded, text, tum,
 };
 use crate::recordings::is_recording;
 use std::path::{Path, PathBuf};
@@ -132,6 +132,7 @@ fn read_text(
     options: &PoseFileOptions,
 ) -> Result<(PoseFormat, ParsedPoses), PoseError> {
     let text = text::read(path)?;
+    let text = matrix_blocks::on_one_line(&text);
     let format = match options.format {
         Some(format) => format,
         None => detect_format(path, &text, options)?,

@@ -21,7 +21,11 @@ pub(super) fn words(line: &str) -> Result<Vec<Cow<'_, str>>, String> {
         column.trim().is_empty() && index + 1 < columns.len() && !b"\t ".contains(&separator)
     };
     if let Some(gap) = columns.iter().enumerate().position(is_gap) {
-        return Err(format!("column {} is empty", gap + 1));
+        return Err(format!(
+            "column {} is empty; every row has all numbers, and rows above a table or below it, as \
+             titles and sums, are to be deleted",
+            gap + 1
+        ));
     }
     let words = columns.into_iter().flat_map(str::split_whitespace);
     Ok(words

@@ -57,6 +57,10 @@ pub fn number(word: &str, form: &str) -> Result<f64, String> {
         Some(_) => Err(format!(
             "`{word}` is not finite; remove the frame or give it a pose"
         )),
+        None if word.is_empty() => Err(format!(
+            "a cell is empty; a pose is `{form}`, and rows below a table, as sums, are to be \
+             deleted"
+        )),
         None => Err(format!("`{word}` is not a number; a pose is `{form}`")),
     }
 }

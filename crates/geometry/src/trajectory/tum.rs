@@ -64,7 +64,16 @@ fn parse_line(
     order: QuaternionOrder,
     unit: Option<TimeUnit>,
 ) -> Result<PoseEntry, String> {
-    let [time, pose @ ..]: [Cow<'_, str>; 8] = row::exact_words(line, FORM)?;
+    let [time, pose @ ..]: [Cow<'_, str>; 8] = row::exact_words(line, FORM).map_err(|what| {
+        let count = row::words(line).map_or(0, |words| words.len());
+        let has_no_time = count + 1 == FORM.split(' ').count();
+        let remedy = if has_no_time {
+            "; if times are missing, a first line `tx ty tz qx qy qz qw` says so"
+        } else {
+            ""
+        };
+        format!("{what}{remedy}")
+    })?;
     let mut values = [0.0; 7];
     for (value, word) in values.iter_mut().zip(&pose) {
         *value = text::number(word, FORM)?;

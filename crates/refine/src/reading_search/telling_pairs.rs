@@ -106,7 +106,7 @@ mod tests {
             orientation: PictureOrientation::Stored,
             shift_frames,
             camera: CameraReading::AsGiven,
-            error_scale: 1.0,
+            radius_factor: 1.0,
         }
     }
 
