@@ -13,8 +13,8 @@ pub mod prescreening {
     ///
     /// Higher: more frames are rejected.
     ///
-    /// Chosen by: unknown.
-    pub const MIN_CONTRAST_GREY: f64 = 0.75;
+    /// Chosen by: rounding to whole grey levels, `1/√12`.
+    pub const MIN_CONTRAST_GREY: f64 = 0.29;
 
     /// Root mean square difference at the coarsest level below which two frames are the same
     /// picture, grey levels.

@@ -37,6 +37,6 @@ pub mod shape_terms;
 pub mod step_length;
 pub mod sum_block;
 #[cfg(test)]
-mod test_ring;
+pub mod test_ring;
 pub mod tile_share;
 pub mod unknown_texture;

@@ -39,7 +39,9 @@ pub fn observe_curvature(solution: &Solution) -> Result<f64, ProblemError> {
     let (problem, at) = (&solution.problem, &solution.linearisation);
     let from = &solution.linearised_at;
     let scores = scores_with_random_signs(solution);
-    let factor = problem.symbolic().factorise(problem.pattern(), &at.normal, 0.0);
+    let factor = problem
+        .symbolic()
+        .factorise(problem.pattern(), &at.normal, 0.0);
     // The factor is large; it is not kept.
     let Ok(step) = factor.map(|factor| factor.step(&scores)) else {
         return Ok(1.0);
@@ -70,7 +72,12 @@ pub fn observe_curvature(solution: &Solution) -> Result<f64, ProblemError> {
     let change = along(&next.normal.gradient) - along(&at.normal.gradient);
     let curvature = (change - of_others) / (along(&predicted) - of_others);
     // NaN, too, is none.
-    Ok(curvature.min(1.0).max(NO_CURVATURE))
+    let has_any = curvature > NO_CURVATURE;
+    Ok(if has_any {
+        curvature.min(1.0)
+    } else {
+        NO_CURVATURE
+    })
 }
 
 /// `z`, for every slot.
@@ -86,4 +93,54 @@ fn scores_with_random_signs(solution: &Solution) -> Vec<FrameStep> {
         }
     }
     scores
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::test_ring::Ring;
+    use crate::samples::sampling::Sampling;
+    use crate::solver::argmin_glue::solve;
+    use crate::solver::stopping::Stopping;
+    use rand_distr::{Distribution, Normal};
+    use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
+
+    /// Curvature at the coarser level, where the texture is not denoised, of pictures whose wall is
+    /// multiplied by `contrast` and that have noise of `sigma` grey levels.
+    fn curvature_of(contrast: f32, sigma: f32) -> f64 {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let noise = Normal::new(0.0f32, sigma).unwrap();
+        let ring = Ring::new(1e-4);
+        let mut picture = |frame: &GreyImage| {
+            let values = frame.data().iter();
+            let data = values.map(|v| contrast * v + noise.sample(&mut rng));
+            Pyramid::new(
+                GreyImage::new(frame.width(), frame.height(), data.collect()),
+                2,
+            )
+        };
+        let frames: Vec<Pyramid> = ring.wall.frames().iter().map(&mut picture).collect();
+        let mut ring = Ring {
+            frames: FrameCache::of_pyramids(frames),
+            ..ring
+        };
+        for estimate in &mut ring.estimates {
+            (estimate.log_gain, estimate.bias) = (0.0, 0.0);
+        }
+        let stopping = Stopping {
+            max_iterations: 5,
+            step_px: 1e-3,
+            step_sigma: 0.1,
+        };
+        let solution = solve(ring.problem_of(Sampling::of(1)), stopping).unwrap();
+        observe_curvature(&solution).unwrap()
+    }
+
+    #[test]
+    fn score_changes_as_predicted_only_where_there_is_texture() {
+        let textured = curvature_of(1.0, 1.0);
+        assert!((0.8..=1.0).contains(&textured), "{textured}");
+        let noisy = curvature_of(0.0, 8.0);
+        assert!(noisy < 0.5, "{noisy}");
+    }
 }

@@ -88,16 +88,9 @@ pub fn estimate_readout(
         Err(ProblemError::Factor { .. }) => return Ok(None),
         Err(error) => return Err(error),
     };
-    let (problem, at) = (&solution.problem, &solution.linearisation);
-    let factor = problem
-        .symbolic()
-        .factorise(problem.pattern(), &at.normal, 0.0);
-    let Ok(factor) = factor else {
-        return Ok(None);
-    };
-    let curvature = observe_curvature(&solution, &factor)?;
-    let Ok(Some(posterior)) = Posterior::at(&solution, &problem.score_scatter(at), curvature)
-    else {
+    let curvature = observe_curvature(&solution)?;
+    let scatter = solution.problem.score_scatter(&solution.linearisation);
+    let Ok(Some(posterior)) = Posterior::at(&solution, &scatter, curvature) else {
         return Ok(None);
     };
     let Some(covariance) = posterior.covariance(&calibration.free) else {
