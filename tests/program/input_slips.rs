@@ -269,40 +269,6 @@ fn names_with_accents_and_counters_with_points_are_associated() {
     succeed(&["check", text(dir)]);
 }
 
-/// Surveys whose pictures hardly measure positions: where the radius used to be named.
-#[test]
-fn right_surveys_with_weak_pictures_get_no_advice() {
-    let folder = tempfile::tempdir().unwrap();
-    let frames = ["--frames", "24", "--size", "240x180", "--wall", "concrete"];
-    for (name, options) in [
-        (
-            "overlap",
-            &["--turn-deg", "55", "--advance-m", "0.02", "--seed", "11"][..],
-        ),
-        (
-            "blur",
-            &[
-                "--motion-blur-px",
-                "6",
-                "--defocus-px",
-                "2",
-                "--seed",
-                "111",
-            ],
-        ),
-        (
-            "noise",
-            &["--radius-m", "1", "--noise", "6", "--seed", "541"],
-        ),
-    ] {
-        let survey = folder.path().join(name);
-        simulate(&survey, &[&frames[..], options].concat());
-        let said = succeed(&["check", text(&survey), "--json"]);
-        let check: Value = serde_json::from_str(&said).unwrap();
-        assert_eq!(check["readings"], Value::Null, "{name}");
-    }
-}
-
 /// Degrees that are declared as radians: only the pictures tell.
 #[test]
 fn angles_in_the_other_unit_are_named_by_the_pictures() {

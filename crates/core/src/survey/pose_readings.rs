@@ -89,11 +89,6 @@ impl PoseReading {
         }
     }
 
-    /// True if the reading has another radius than given.
-    pub fn changes_radius(&self) -> bool {
-        self.radius_factor != 1.0
-    }
-
     /// Factor of the errors of positions in the tunnel of the given radius, at most 1: wider ones
     /// would excuse what the prior as given does not.
     pub fn error_scale(&self) -> f64 {

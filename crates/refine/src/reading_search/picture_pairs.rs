@@ -1,6 +1,6 @@
 //! Registration of neighbouring frames on each other in a reading of their poses and pictures.
 
-use super::comparison::{FittingPair, FittingPairs};
+use super::comparison::Registrations;
 use crate::error::RefineError;
 use crate::input::RefineInput;
 use crate::model::context::EstimationContext;
@@ -8,13 +8,15 @@ use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::stages::setup::Setup;
-use crate::tracking::neighbour_pairs::{RegisteredPair, register_pairs};
+use crate::tracking::neighbour_pairs::register_pairs;
 use crate::tracking::prescreening::{Prescreened, prescreen};
+use crate::tracking::registration::Registered;
 use image::DynamicImage;
 use tunnelstitch_core::frames::{FrameCache, FrameSet, Light, PictureOrientation, load_colour};
 use tunnelstitch_core::progress::Silent;
 use tunnelstitch_core::survey::{PoseReading, Survey};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::mean_radius_m;
 use tunnelstitch_geometry::trajectory::{Jitter, StampedPose};
 
 /// The pictures of pairs of neighbouring frames.
@@ -68,8 +70,8 @@ impl<'s> PicturePairs<'s> {
     pub fn register(
         &mut self,
         reading: &PoseReading,
-        is_wanted: impl Fn(&[Option<FittingPair>]) -> bool,
-    ) -> Result<FittingPairs, RefineError> {
+        is_wanted: impl Fn(&[Option<Registered>]) -> bool,
+    ) -> Result<Registrations, RefineError> {
         let initial: Vec<StampedPose> = self.frames.iter().map(|k| reading.initial[*k]).collect();
         let options = RefineOptions {
             // Only the poses.
@@ -88,14 +90,24 @@ impl<'s> PicturePairs<'s> {
         };
         let rejections = turned.prescreened.rejections.clone();
         let states = FrameStates::at(&setup.prior.initial, rejections);
-        let fitting = |some: &[Option<RegisteredPair>]| -> FittingPairs {
-            let fitting = some.iter().map(|pair| pair.as_ref().map(FittingPair::of));
-            fitting.collect()
-        };
-        let is_wanted = |some: &[Option<RegisteredPair>]| is_wanted(&fitting(some));
+        let density_nats = self.density_nats(reading, &options);
+        let is_wanted = |some: &[Option<Registered>]| is_wanted(&rarer(some, density_nats));
         let registered = register_pairs(&context, &options, &states, &self.firsts, is_wanted)?;
         self.turned = Some(turned);
-        Ok(fitting(&registered))
+        Ok(rarer(&registered, density_nats))
+    }
+
+    /// Nats by which the density of a registered position is lower in a reading than as given;
+    /// negative, where its prior is narrower: `Σ ½ ln((s²σᵢ² + p²) / (σᵢ² + p²))`, `s` the
+    /// reading's scale of errors, σᵢ the 1-σ as given, and p that to which pictures tell positions.
+    fn density_nats(&self, reading: &PoseReading, options: &RefineOptions) -> f64 {
+        let range_m = mean_radius_m(self.survey.surface.as_ref());
+        let pictures_m = options.max_sigma_px * range_m / self.survey.cameras.of(0).fx;
+        let variance = |sigma_m: f64| sigma_m.powi(2) + pictures_m.powi(2);
+        let sigmas_m = self.survey.prior.translation_sigma_m.into_iter();
+        let ratios =
+            sigmas_m.map(|sigma_m| variance(reading.error_scale() * sigma_m) / variance(sigma_m));
+        0.5 * ratios.map(f64::ln).sum::<f64>()
     }
 
     /// The pictures as a reading turns them.
@@ -131,7 +143,6 @@ impl<'s> PicturePairs<'s> {
         options: &'a RefineOptions,
     ) -> Result<Setup<'a>, RefineError> {
         let given = self.survey.prior;
-        let error_scale = reading.error_scale();
         let input = RefineInput {
             cameras: reading.camera.camera(self.survey.cameras.of(0)).into(),
             frames,
@@ -139,7 +150,7 @@ impl<'s> PicturePairs<'s> {
             prior: Jitter {
                 translation_sigma_m: given
                     .translation_sigma_m
-                    .map(|sigma_m| error_scale * sigma_m),
+                    .map(|sigma_m| reading.error_scale() * sigma_m),
                 ..given
             },
             pose_gaps: &[],
@@ -147,6 +158,15 @@ impl<'s> PicturePairs<'s> {
         };
         Setup::new(input, options)
     }
+}
+
+/// Registrations with a density that is lower by so many nats.
+fn rarer(registered: &[Option<Registered>], nats: f64) -> Registrations {
+    let rarer = |found: Registered| Registered {
+        deviation: found.deviation + nats,
+        ..found
+    };
+    registered.iter().map(|found| found.map(rarer)).collect()
 }
 
 /// The frames of pairs, each once and in their order.

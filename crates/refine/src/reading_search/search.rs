@@ -1,20 +1,23 @@
 //! The search: all readings against the one given.
 
-use super::comparison::{
-    Comparison, FittingPair, MIN_PAIRS, PriorEvidence, exceeds_scatter, overdispersion,
-};
+use super::comparison::Comparison;
 use super::finding::FittingReadings;
 use super::picture_pairs::PicturePairs;
 use super::telling_pairs::{TellingPair, telling_pairs};
 use crate::error::RefineError;
 use crate::options::RefineOptions;
 use crate::tracking::neighbour_pairs::first_frames;
-use crate::tracking::registration::MAX_DEVIATION_COST;
+use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
 use tunnelstitch_core::survey::{PoseReading, Survey, SurveyError};
 
+/// Smallest number of pairs: fewer may fit by chance.
+const MIN_PAIRS: usize = 4;
 /// Evidence below that of the best reading with which another is named beside it, nats: odds of one
 /// to twenty.
 const MAX_DEFICIT_NATS: f64 = 3.0;
+/// Standard errors by which the evidence of pairs for the best reading exceeds that for another one
+/// that it is distinguished from: the 95 % quantile of a normal distribution.
+const MIN_TOLD_SIGMAS: f64 = 1.645;
 /// Evidence of a pair that speaks for poses of other frames, nats: half of that by which its steps
 /// differ at least.
 const MIN_SHIFT_NATS: f64 = 0.5 * MAX_DEVIATION_COST;
@@ -45,15 +48,19 @@ struct Found<'r> {
 
 impl Found<'_> {
     /// True if a reading that has more evidence is distinguished from this one: by its odds, and by
-    /// the evidence of pairs, which differs by more than it scatters.
+    /// the evidence of pairs, which differs by more than it scatters (Q. H. Vuong, "Likelihood
+    /// ratio tests for model selection and non-nested hypotheses", Econometrica 57, 1989).
     fn is_distinguished_from(&self, best: &Self) -> bool {
         if best.log_odds - self.log_odds <= MAX_DEFICIT_NATS {
             return false;
         }
         let pairs = best.pair_nats.iter().zip(&self.pair_nats);
         let differences: Vec<f64> = pairs.map(|(best, own)| best - own).collect();
+        let count = differences.len() as f64;
+        let sum: f64 = differences.iter().sum();
+        let squares: f64 = differences.iter().map(|d| (d - sum / count).powi(2)).sum();
         let is_usual = self.reading.prior_nats >= 0.0;
-        differences.is_empty() || !is_usual || exceeds_scatter(&differences)
+        differences.is_empty() || !is_usual || sum > MIN_TOLD_SIGMAS * squares.sqrt()
     }
 }
 
@@ -62,12 +69,11 @@ impl Found<'_> {
 ///
 /// A frame is registered on the wall that the one before it shows, as tracking does, from the
 /// reading's pose and within its prior. Where it is found in both readings, the evidence against
-/// the one given is by how much less the displacement that the pictures measure deviates from the
-/// prior ([`crate::tracking::innovation`]), and, with another camera, by how much better it
-/// correlates. A reading is taken if three
+/// the one given is by how much less the frame deviates from the prior, `½ eᵀΣ⁻¹e`, and, with
+/// another camera, by how much better it correlates. A reading is taken if three
 /// quarters of the pairs fit and speak for it, and its odds exceed the number of readings over the
-/// survey's rate of false alarms, by more than pairs scatter. There may be several: poses exactly
-/// as planned, seen from the tunnel's other end, are those of another convention.
+/// survey's rate of false alarms. There may be several: poses exactly as planned, seen from the
+/// tunnel's other end, are those of another convention.
 ///
 /// Poses of other frames are compared by the pairs that tell them ([`telling_pairs`]), all other
 /// readings by pairs that are evenly distributed.
@@ -106,7 +112,6 @@ fn among_all_pairs<'r>(
     let mut comparison = Comparison {
         of_given: pictures.register(given, |_| true)?,
         telling: vec![true; firsts.len()],
-        false_alarm_nats: least_nats,
         least_nats,
         min_pair_nats: 0.0,
     };
@@ -140,11 +145,11 @@ fn among_telling_pairs<'r>(
     let firsts: Vec<usize> = telling.iter().map(|pair| pair.first).collect();
     let mut pictures = PicturePairs::load(survey, &firsts)?;
     let compared =
-        |k: usize, of_given: &[Option<FittingPair>]| compared(&telling, k, of_given, least_nats);
+        |k: usize, of_given: &[Option<Registered>]| compared(&telling, k, of_given, least_nats);
     // Pairs that are still to be registered may not fit as given.
-    let may_take_any = |some: &[Option<FittingPair>]| {
+    let may_take_any = |some: &[Option<Registered>]| {
         let mut all = (0..shifted.len()).filter_map(|k| compared(k, some));
-        all.any(|comparison| comparison.may_take(&[], PriorEvidence::Deviation))
+        all.any(|comparison| comparison.may_take(&[]))
     };
     let of_given = pictures.register(given, may_take_any)?;
     if !may_take_any(&of_given) {
@@ -164,7 +169,7 @@ fn among_telling_pairs<'r>(
 fn compared(
     telling: &[TellingPair],
     k: usize,
-    of_given: &[Option<FittingPair>],
+    of_given: &[Option<Registered>],
     least_nats: f64,
 ) -> Option<Comparison> {
     let mut of_given = of_given.to_vec();
@@ -177,7 +182,6 @@ fn compared(
     is_enough.then_some(Comparison {
         of_given,
         telling: tells,
-        false_alarm_nats: least_nats,
         least_nats,
         min_pair_nats: MIN_SHIFT_NATS,
     })
@@ -189,23 +193,13 @@ fn compare<'r>(
     comparison: &Comparison,
     reading: &'r PoseReading,
 ) -> Result<Option<Found<'r>>, RefineError> {
-    let by = if reading.changes_radius() {
-        PriorEvidence::Innovation
-    } else {
-        PriorEvidence::Deviation
-    };
-    if !comparison.may_take(&[], by) {
+    if !comparison.may_take(&[]) {
         return Ok(None);
     }
-    let registered = pictures.register(reading, |some| comparison.may_take(some, by))?;
-    let pair_nats = comparison.pair_nats(&registered, by, reading.changes_camera());
+    let registered = pictures.register(reading, |some| comparison.may_take(some))?;
+    let pair_nats = comparison.pair_nats(&registered, reading.changes_camera());
     let log_odds = reading.prior_nats + pair_nats.iter().sum::<f64>();
-    let significant_nats = log_odds / overdispersion(&registered, by);
-    let is_taken = comparison.may_take(&registered, by)
-        && !comparison.is_contradicted(&registered, by)
-        && exceeds_scatter(&pair_nats)
-        && significant_nats > comparison.false_alarm_nats
-        && log_odds > comparison.least_nats;
+    let is_taken = comparison.may_take(&registered) && log_odds > comparison.least_nats;
     Ok(is_taken.then(|| Found {
         reading,
         fitting: registered.iter().flatten().count(),

@@ -131,8 +131,8 @@ impl TextureSpectrum {
     }
 
     /// `s_kl`, l the row: means over the residuals whose energy `Σ ρ²` is not beyond
-    /// [`upper_fence`], as that of edges and foreign objects; 0 for the mean of a tile, which has no
-    /// slope and passes.
+    /// [`upper_fence`], as that of edges and foreign objects; 0 for the mean of a tile, which has
+    /// no slope and passes.
     fn noise_spectrum(&self) -> Square<f64> {
         let energy = |squares: &Square<f32>| squares.iter().flatten().sum::<f32>();
         let mut energies: Vec<f32> = self.residuals.iter().map(energy).collect();

@@ -13,8 +13,8 @@ use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::options::RefineOptions;
 use crate::parameters::calibration::{FOCAL_INDEX, Kappa};
-use crate::tracking::neighbour_pairs::{RegisteredPair, first_frames, register_pairs};
-use crate::tracking::registration::MAX_DEVIATION_COST;
+use crate::tracking::neighbour_pairs::{first_frames, register_pairs};
+use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
 use tunnelstitch_core::progress::Progress;
 
 /// Distance between the logarithms of neighbouring focal lengths: half of it moves the border of a
@@ -79,7 +79,7 @@ pub fn focal_search_registrations(sigma: f64, frames: usize) -> usize {
 
 /// Log-posterior of the second frame of a pair; one that does not fit deviates by as much as the
 /// prior allows, and correlates with nothing.
-fn log_posterior(registered: &Option<RegisteredPair>) -> f64 {
+fn log_posterior(registered: &Option<Registered>) -> f64 {
     registered.map_or(-MAX_DEVIATION_COST, |registered| {
         registered.log_likelihood - registered.deviation
     })

@@ -19,7 +19,6 @@ pub mod correlation_search;
 pub mod correlator;
 pub mod first_light;
 pub mod focal_search;
-pub mod innovation;
 pub mod lamp_search;
 pub mod light_model;
 pub mod neighbour_pairs;

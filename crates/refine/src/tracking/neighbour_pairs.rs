@@ -1,16 +1,14 @@
 //! Registration of pairs of neighbouring frames, by which hypotheses about the whole survey are
 //! told apart: of how its poses are to be read, of its focal length.
 
-use crate::model::context::{EstimationContext, FrameWindow};
+use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::samples::footprints::footprint;
-use crate::tracking::innovation::Innovation;
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::PosePrediction;
-use crate::tracking::registration::{Effort, register_frame};
-use std::borrow::Cow;
+use crate::tracking::registration::{Effort, Registered, register_frame};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Largest number of pairs of neighbouring frames that are looked at: bounds the time.
@@ -21,18 +19,6 @@ const PAIRS_AT_ONCE: usize = 4;
 /// Hypotheses of a frame's pose that are refined: neighbours overlap by much if all is right, so
 /// that the right one is among the best.
 const MAX_PAIR_HYPOTHESES: usize = 2;
-
-/// The second frame of a pair, registered on the wall that the first one shows.
-#[derive(Clone, Copy, Debug)]
-pub struct RegisteredPair {
-    /// Deviation of its estimate from the prior's prediction, `½ eᵀΣ⁻¹e`.
-    pub deviation: f64,
-    /// Its displacement from the prediction as the pictures measure it; None where they share no
-    /// wall.
-    pub innovation: Option<Innovation>,
-    /// Log-likelihood of its correlation with the wall, nats.
-    pub log_likelihood: f64,
-}
 
 /// The first frames of the pairs: evenly distributed, no frame in two pairs.
 pub fn first_frames(frames: usize) -> Vec<usize> {
@@ -51,8 +37,8 @@ pub fn register_pairs(
     options: &RefineOptions,
     states: &FrameStates,
     firsts: &[usize],
-    is_wanted: impl Fn(&[Option<RegisteredPair>]) -> bool,
-) -> Result<Vec<Option<RegisteredPair>>, ProblemError> {
+    is_wanted: impl Fn(&[Option<Registered>]) -> bool,
+) -> Result<Vec<Option<Registered>>, ProblemError> {
     let mut registered = Vec::new();
     for batch in firsts.chunks(PAIRS_AT_ONCE) {
         if !is_wanted(&registered) {
@@ -71,7 +57,7 @@ fn register_second(
     options: &RefineOptions,
     states: &FrameStates,
     first: usize,
-) -> Result<Option<RegisteredPair>, ProblemError> {
+) -> Result<Option<Registered>, ProblemError> {
     let frame_range = first..first + 2;
     if states.inliers(&frame_range).contains(&false) {
         return Ok(None);
@@ -88,7 +74,7 @@ fn register_second(
         estimates,
         registered: &[true, false],
         footprints: &footprints,
-        frame_range: frame_range.clone(),
+        frame_range,
     };
     let predicted = PosePrediction {
         pose: estimates[1].pose,
@@ -103,21 +89,7 @@ fn register_second(
         &neighbours,
         &mut effort,
     )?;
-    let Ok(registered) = registered else {
-        return Ok(None);
-    };
-    let window = FrameWindow {
-        participants: frame_range,
-        active: first + 1..first + 2,
-        estimates: &[estimates[0], registered.estimate],
-        compared: Cow::Owned(vec![true; 2]),
-    };
-    let level = options.handover_level(context.cameras.shorter_side());
-    Ok(Some(RegisteredPair {
-        deviation: registered.deviation,
-        innovation: Innovation::of(context, level, window, &predicted.pose)?,
-        log_likelihood: registered.log_likelihood,
-    }))
+    Ok(registered.ok())
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@
 //! **D is not the normal matrix H.** Gauss–Newton weighs a residual by `ω = ψ(e)/e`, but as the
 //! residual grows its weight falls: a score `Σ ψ(e) ∂e` has the derivative `Σ ψ'(e) ∂e ∂eᵀ`, and ψ'
 //! is less than ω (0.89 of it in the mean, for Gaussian residuals). Slopes that are not quite those
-//! of the wall, as on faint or very sharp walls, make a difference, too. D is observed at the end of
-//! a solve: `D = κ H`, with κ about 0.9 ([`crate::uncertainty::observed_curvature`]).
+//! of the wall, as on faint or very sharp walls, make a difference, too. D is observed at the end
+//! of a solve: `D = κ H`, with κ about 0.9 ([`crate::uncertainty::observed_curvature`]).
 //!
 //! **Q** is estimated from the scatter of the gradients of parts of the cost, `V = Σ_b g_b g_bᵀ`
 //! over blocks b of the wall (32 × 32 pixels: errors of neighbouring samples are correlated, those

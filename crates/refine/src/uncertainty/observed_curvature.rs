@@ -1,9 +1,9 @@
 //! The derivative D of the score over the normal matrix H, as observed at the end of a solve.
 //!
-//! The estimate is displaced by what noise may have done to it: by `δ = H⁻¹ z`, with `z = Σ ε_b g_b`
-//! the gradients of blocks of the wall with random signs ε. In the mean over the signs all
-//! directions count that pixels determine, each by its variance. There the score changes by `D δ`,
-//! where the equations predict `H δ`. With P the prior's and the points' part, in both,
+//! The estimate is displaced by what noise may have done to it: by `δ = H⁻¹ z`, with
+//! `z = Σ ε_b g_b` of the gradients of blocks of the wall, and random signs ε. In the mean over the
+//! signs all directions count that pixels determine, each by its variance. There the score changes
+//! by `D δ`, where the equations predict `H δ`. With P the prior's and the points' part, in both,
 //!
 //! `κ = δᵀ(g(x + δ) − g(x) − P δ) / δᵀ(H − P) δ`,
 //!
@@ -15,8 +15,8 @@
 //! of the last ones are the weakest directions, which the prior determines.
 //!
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard
-//! conditions", 1967; M. F. Hutchinson, "A stochastic estimator of the trace of the influence matrix
-//! for Laplacian smoothing splines", Communications in Statistics 18(3), 1989 (random signs).
+//! conditions", 1967; M. F. Hutchinson, "A stochastic estimator of the trace of the influence
+//! matrix for Laplacian smoothing splines", Communications in Statistics 18(3), 1989 (the signs).
 
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
