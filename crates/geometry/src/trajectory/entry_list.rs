@@ -131,11 +131,10 @@ mod tests {
         }
         list.push(7, entry(6.0, 0.1)).unwrap();
         list.push(9, entry(6.0, 0.1012)).unwrap();
-        assert!(
-            list.push(10, entry(5.0, 0.0))
-                .unwrap_err()
-                .contains("sort the file")
-        );
+        let mut message_of = |time_s| list.push(10, entry(time_s, 0.0)).unwrap_err();
+        assert!(message_of(5.5).contains("sort the file"));
+        // The first time again.
+        assert!(message_of(5.0).contains("several trajectories"));
         let parsed = list.into_parsed();
         assert_eq!(parsed.entries, [entry(5.0, 0.0), entry(6.0, 0.1)]);
         let [conflict] = parsed.conflicts[..] else {

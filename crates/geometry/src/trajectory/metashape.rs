@@ -216,7 +216,7 @@ mod tests {
                 "is 0; it must",
             ),
             (two, "2 components that are not aligned"),
-            ("<html/>".to_owned(), "not the cameras of Metashape"),
+            ("<gpx/>".to_owned(), "not the cameras of Metashape"),
             (
                 "<document><chunk/><chunk/></document>".to_owned(),
                 "holds 2 chunks",
