@@ -62,18 +62,28 @@ impl PhotometricProblem<'_> {
     /// [`MAX_ERROR_SIGMA`]. None if they have to be computed from all tiles: if there is no such
     /// share, or if tiles are not computed one by one.
     pub fn change_share(&self, at: &Linearisation, step_px: f64) -> Option<usize> {
-        if self.wall_model.is_some() || self.assumed_texture.is_some() {
-            return None;
-        }
-        let samples = at.frames.iter().map(|frame| frame.samples);
-        let fewest = samples.filter(|samples| *samples > 0).min()? / SAMPLES;
         let beta = |distance_px| self.sampling.interpolation.autocorrelation(distance_px);
         let change = 2.0 * (1.0 - beta(step_px / self.pixel_px()) / beta(0.0));
-        let mut shares = SHARES.into_iter();
-        shares.find(|stride| {
-            let error = ((stride - 1) as f64 * change).sqrt();
-            fewest >= stride * MIN_FRAME_TILES && error < MAX_ERROR_SIGMA
-        })
+        let error = |stride: usize| ((stride - 1) as f64 * change).sqrt();
+        self.shares(at)
+            .find(|stride| error(*stride) < MAX_ERROR_SIGMA)
+    }
+
+    /// The n of the smallest share that stands for all tiles, by which a mean over all frames of
+    /// the equations' change is computed; None as for [`PhotometricProblem::change_share`].
+    pub fn mean_change_share(&self, at: &Linearisation) -> Option<usize> {
+        self.shares(at).next()
+    }
+
+    /// The n of the shares that save work and have [`MIN_FRAME_TILES`], the smallest share first;
+    /// none if tiles are not computed one by one.
+    fn shares(&self, at: &Linearisation) -> impl Iterator<Item = usize> {
+        let by_tiles = self.wall_model.is_none() && self.assumed_texture.is_none();
+        let samples = at.frames.iter().map(|frame| frame.samples);
+        let fewest = samples.filter(|samples| *samples > 0).min();
+        let fewest = fewest.filter(|_| by_tiles).unwrap_or(0) / SAMPLES;
+        let has_enough = move |stride: &usize| fewest >= stride * MIN_FRAME_TILES;
+        SHARES.into_iter().filter(has_enough)
     }
 
     /// Cost and normal equations at the unknowns `to`, from those `at` the unknowns `from` and

@@ -7,9 +7,10 @@
 //!
 //! `κ = δᵀ(g(x + δ) − g(x) − P δ) / δᵀ(H − P) δ`,
 //!
-//! over the poses' part of δ. It is about 0.9 for Gaussian residuals, as weights fall where
-//! residuals grow (`ψ' ≤ ω`), and far less where the slopes of a faint wall are noise: then the
-//! score hardly changes, and the estimate is much less certain than H says.
+//! over the poses' part of δ. Over all unknowns of all frames, what single tiles contribute by
+//! chance averages out, so a share of the tiles is enough. κ is about 0.9 for Gaussian residuals,
+//! as weights fall where residuals grow (`ψ' ≤ ω`), and far less where the slopes of a faint wall
+//! are noise: then the score hardly changes, and the estimate is much less certain than H says.
 //!
 //! Steps of the solve show the same along one direction each, most of them far from its end; those
 //! of the last ones are the weakest directions, which the prior determines.
@@ -47,9 +48,7 @@ pub fn observe_curvature(solution: &Solution) -> Result<f64, ProblemError> {
         return Ok(1.0);
     };
     let to = problem.stepped(from, &step, &Kappa::zeros());
-    let moved = problem.wall_step_px(&from.frames, &step, &Kappa::zeros());
-    let step_px = moved.into_iter().fold(0.0, f64::max);
-    let next = match problem.change_share(at, step_px) {
+    let next = match problem.mean_change_share(at) {
         Some(stride) => problem.linearise_change(at, (from, &to), stride)?,
         None => problem.linearise_at(&to)?,
     };
