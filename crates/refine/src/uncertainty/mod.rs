@@ -1,9 +1,9 @@
 //! The stated uncertainty, and tests of the model that it rests on.
 //!
 //! ```text
-//! observed_curvature, exposure_equations → covariance, model_error
+//! exposure_equations → covariance, model_error
 //! covariance, frame_sigma ──→ overdispersion ─┐
-//! observability ──────────────────────────────┴→ solution_uncertainty
+//! observed_curvature → observability ─────────┴→ solution_uncertainty
 //! observability → calibration_report, rolling_shutter_test
 //! ```
 //!

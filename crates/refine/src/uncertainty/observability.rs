@@ -6,12 +6,13 @@
 //! it another may be observed.
 
 use crate::linear::bordered_system::{BorderBlock, SchurComplement, SharedBlock, reduce_to_shared};
-use crate::linear::sparse_cholesky::FactorError;
+use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::problem::score_scatter::ScoreScatter;
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::MAX_SIGMA_SHARE;
+use crate::uncertainty::observed_curvature::observe_curvature;
 use crate::uncertainty::shared_parameter_names::{PARAMETERS, ParameterKind};
 use nalgebra::{DMatrix, SMatrix};
 use serde::{Deserialize, Serialize};
@@ -44,28 +45,36 @@ pub struct Posterior {
 }
 
 impl Posterior {
-    /// Eliminates the poses at a solution with the `curvature` κ
-    /// ([`crate::uncertainty::observed_curvature`]); None if no shared parameter was estimated.
+    /// Observes the curvature κ ([`crate::uncertainty::observed_curvature`]) at a solution and
+    /// eliminates the poses; no posterior if no shared parameter was estimated. Where the normal
+    /// matrix is singular and none was, nothing is known of the poses, and κ is 1.
     ///
     /// # Errors
-    /// [`FactorError`] if the poses' normal matrix is singular.
-    pub fn at(
+    /// [`ProblemError::Factor`] if shared parameters were estimated and the poses' normal matrix is
+    /// singular; a frame that has to be read again and cannot be.
+    pub fn with_curvature(
         solution: &Solution,
         scatter: &ScoreScatter,
-        curvature: f64,
-    ) -> Result<Option<Self>, FactorError> {
+    ) -> Result<(f64, Option<Self>), ProblemError> {
         let (problem, at) = (&solution.problem, &solution.linearisation);
-        let (Some(border), Some(border_scatter)) = (&at.border, &scatter.border) else {
-            return Ok(None);
-        };
+        let borders = at.border.as_ref().zip(scatter.border.as_ref());
         let pattern = problem.pattern();
-        let factor = problem.symbolic().factorise(pattern, &at.normal, 0.0)?;
-        let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
-        let (prior, prior_border) = problem.other_information(&solution.unknowns);
-        let scatter = (reduce_to_shared(pattern, &scatter.blocks, border_scatter, &w)
-            + reduce_to_shared(pattern, &prior, &prior_border, &w))
-            / curvature.powi(2);
-        Ok(Some(Self { w, schur, scatter }))
+        // The factor is large; it is not kept.
+        let factor = match problem.symbolic().factorise(pattern, &at.normal, 0.0) {
+            Ok(factor) => factor,
+            Err(_) if borders.is_none() => return Ok((1.0, None)),
+            Err(source) => return Err(problem.factor_error(source)),
+        };
+        let curvature = observe_curvature(solution, &factor)?;
+        let posterior = borders.map(|(border, border_scatter)| {
+            let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
+            let (prior, prior_border) = problem.other_information(&solution.unknowns);
+            let scatter = (reduce_to_shared(pattern, &scatter.blocks, border_scatter, &w)
+                + reduce_to_shared(pattern, &prior, &prior_border, &w))
+                / curvature.powi(2);
+            Self { w, schur, scatter }
+        });
+        Ok((curvature, posterior))
     }
 
     /// Covariance `Σ_κ` of the `free` parameters, zero elsewhere; None if S is singular.

@@ -19,6 +19,7 @@
 //! conditions", 1967; M. F. Hutchinson, "A stochastic estimator of the trace of the influence
 //! matrix for Laplacian smoothing splines", Communications in Statistics 18(3), 1989 (the signs).
 
+use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameStep;
@@ -32,21 +33,14 @@ use rand_chacha::ChaCha8Rng;
 /// times those of a good solution, and nothing is believed.
 const NO_CURVATURE: f64 = 1e-3;
 
-/// Observes κ at a solution; 1 if its normal matrix is singular, as nothing is known of it then.
+/// Observes κ at a solution; `factor`: of its normal matrix.
 ///
 /// # Errors
 /// A frame that has to be read again and cannot be.
-pub fn observe_curvature(solution: &Solution) -> Result<f64, ProblemError> {
+pub fn observe_curvature(solution: &Solution, factor: &Factor) -> Result<f64, ProblemError> {
     let (problem, at) = (&solution.problem, &solution.linearisation);
     let from = &solution.linearised_at;
-    let scores = scores_with_random_signs(solution);
-    let factor = problem
-        .symbolic()
-        .factorise(problem.pattern(), &at.normal, 0.0);
-    // The factor is large; it is not kept.
-    let Ok(step) = factor.map(|factor| factor.step(&scores)) else {
-        return Ok(1.0);
-    };
+    let step = factor.step(&scores_with_random_signs(solution));
     let to = problem.stepped(from, &step, &Kappa::zeros());
     let next = match problem.mean_change_share(at) {
         Some(stride) => problem.linearise_change(at, (from, &to), stride)?,
@@ -132,7 +126,11 @@ mod tests {
             step_sigma: 0.1,
         };
         let solution = solve(ring.problem_of(Sampling::of(1)), stopping).unwrap();
-        observe_curvature(&solution).unwrap()
+        let (problem, at) = (&solution.problem, &solution.linearisation);
+        let factor = problem
+            .symbolic()
+            .factorise(problem.pattern(), &at.normal, 0.0);
+        observe_curvature(&solution, &factor.unwrap()).unwrap()
     }
 
     #[test]

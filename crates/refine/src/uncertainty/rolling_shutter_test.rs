@@ -22,7 +22,6 @@ use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
 use crate::thresholds::rolling_shutter_test::MIN_DIFFERENCE_SIGMA;
 use crate::uncertainty::observability::Posterior;
-use crate::uncertainty::observed_curvature::observe_curvature;
 use nalgebra::Vector3;
 use serde::Serialize;
 use tunnelstitch_core::survey::{CalibrateSection, CalibrationGroup};
@@ -88,10 +87,11 @@ pub fn estimate_readout(
         Err(ProblemError::Factor { .. }) => return Ok(None),
         Err(error) => return Err(error),
     };
-    let curvature = observe_curvature(&solution)?;
     let scatter = solution.problem.score_scatter(&solution.linearisation);
-    let Ok(Some(posterior)) = Posterior::at(&solution, &scatter, curvature) else {
-        return Ok(None);
+    let posterior = match Posterior::with_curvature(&solution, &scatter) {
+        Ok((_, Some(posterior))) => posterior,
+        Ok((_, None)) | Err(ProblemError::Factor { .. }) => return Ok(None),
+        Err(error) => return Err(error),
     };
     let Some(covariance) = posterior.covariance(&calibration.free) else {
         return Ok(None);

@@ -16,7 +16,6 @@ use crate::uncertainty::covariance::{Covariances, compute_covariances};
 use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma_by};
 use crate::uncertainty::model_error::{EstimateErrors, ModelErrorReport};
 use crate::uncertainty::observability::{Posterior, UnobservableParameter};
-use crate::uncertainty::observed_curvature::observe_curvature;
 use crate::uncertainty::overdispersion::{Overdispersion, compute_overdispersions};
 use crate::uncertainty::pixel_jacobians::{PointJacobians, pixel_jacobians};
 use crate::uncertainty::registration_sigma::registration_sigmas;
@@ -58,9 +57,7 @@ impl SolutionUncertainty {
         let problem = &solution.problem;
         let frames = solution.unknowns.frames.len();
         let scatter = problem.score_scatter(&solution.linearisation);
-        let curvature = observe_curvature(solution)?;
-        let posterior = Posterior::at(solution, &scatter, curvature);
-        let posterior = posterior.map_err(|source| problem.factor_error(source))?;
+        let (curvature, posterior) = Posterior::with_curvature(solution, &scatter)?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
         let (prior, _) = problem.other_information(&solution.unknowns);
