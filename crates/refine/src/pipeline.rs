@@ -220,18 +220,15 @@ fn may_normalise(setup: &Setup) -> bool {
 }
 
 /// True if the light of most frames that show something fits the model, as far as they tell: a
-/// shading explains it and they are inliers, or, at the end, are photometric. Where they contradict
-/// the lengths of the prior they fit each other.
+/// shading explains it and they are inliers. Where they contradict the lengths of the prior they fit
+/// each other.
 fn fits_light(ended: &Estimation) -> bool {
-    if !ended.state.has_common_light {
-        return false;
-    }
-    let Some(refined) = &ended.refined else {
-        return ended.state.frames.has_majority();
-    };
-    let report = &refined.report;
-    report.frames_on_prior * 2 <= report.frames.len()
-        || report.prior_test.contradicting_scale().is_some()
+    let prior_test = ended
+        .refined
+        .as_ref()
+        .map(|refined| &refined.report.prior_test);
+    let contradicts_scale = prior_test.is_some_and(|test| test.contradicting_scale().is_some());
+    ended.state.has_common_light && (ended.state.frames.has_majority() || contradicts_scale)
 }
 
 /// The end without a solution: poses that nothing determines are those given.

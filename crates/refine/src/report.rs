@@ -92,6 +92,9 @@ pub struct FrameReport {
 pub struct LevelReport {
     /// Wall samples per pixel along each axis.
     pub samples_per_pixel: f64,
+    /// Pyramid level of these pixels: each halves the frames; 0 is full size.
+    #[serde(default)]
+    pub level: usize,
     /// True if the wall was solved for jointly with the poses.
     #[serde(default)]
     pub joint: bool,

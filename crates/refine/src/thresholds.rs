@@ -25,6 +25,18 @@ pub mod prescreening {
     pub const MAX_REPEAT_DIFFERENCE_GREY: f64 = 0.1;
 }
 
+/// Thresholds of `stages/solve.rs`.
+pub mod last_solve {
+    /// Scatter η of the score's derivative, over its mean, above which the last solve is tried in
+    /// pixels of twice the size.
+    ///
+    /// Higher: faint walls are solved in finer pixels, where steps wander. Lower: the tries take
+    /// more time.
+    ///
+    /// Chosen by: a step leaves η of the error; from a half on, most steps are waste.
+    pub const MAX_CURVATURE_SCATTER: f64 = 0.5;
+}
+
 /// Thresholds of `points/wall_points.rs`.
 pub mod wall_points {
     /// Measured points that are kept of a cell of the wall, whose side is a 64th of the perimeter.

@@ -52,10 +52,10 @@ fn print_solves(report: &RefineReport, terminal: &Terminal) {
             solve.cost_end,
             solve.observations,
             solve.sigma,
-            if level.joint {
-                "  jointly with the wall"
-            } else {
-                ""
+            match (level.joint, level.level) {
+                (true, _) => "  jointly with the wall".to_owned(),
+                (false, 0) => String::new(),
+                (false, level) => format!("  pixels of size {}", 1 << level),
             }
         ));
     }

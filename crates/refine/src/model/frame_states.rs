@@ -91,7 +91,8 @@ impl FrameStates {
     }
 }
 
-/// Finds out whether most of the frames that show something are inliers.
+/// Finds out whether most of the frames that show something fit each other. One whose pixels tell
+/// little does, too.
 ///
 /// # Errors
 /// The reason for which none of them is right otherwise: they may fit each other by chance, and a
@@ -101,7 +102,11 @@ pub fn majority(rejections: &[Option<RejectionReason>]) -> Result<(), RejectionR
         !(rejection.as_ref()).is_some_and(RejectionReason::shows_nothing)
     };
     let shown = rejections.iter().filter(shows_something).count();
-    let frames = rejections.iter().filter(|one| one.is_none()).count();
+    let fits = |rejection: &&Option<RejectionReason>| match rejection {
+        Some(RejectionReason::Uncertain { wall_px }) => wall_px.is_finite(),
+        rejection => rejection.is_none(),
+    };
+    let frames = rejections.iter().filter(fits).count();
     if frames > 1 && 2 * frames > shown {
         Ok(())
     } else {
@@ -120,6 +125,8 @@ mod tests {
         let dark = || Some(RejectionReason::Featureless);
         assert!(majority(&[None, None, None, rejected(), rejected()]).is_ok());
         assert!(majority(&[None, None, rejected(), dark(), dark()]).is_ok());
+        let uncertain = || Some(RejectionReason::Uncertain { wall_px: 0.3 });
+        assert!(majority(&[None, uncertain(), uncertain(), rejected()]).is_ok());
         let minority = RejectionReason::Minority {
             frames: 2,
             shown: 4,

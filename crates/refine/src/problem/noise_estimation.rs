@@ -67,17 +67,19 @@ impl PhotometricProblem<'_> {
         let interpolation = self.sampling.interpolation;
         let axis = interpolation.autocorrelation(0.0);
         let single = self.context.noise.powi(2)
+            * noise_at_level(self.sampling.level)
             * match interpolation {
-                Interpolation::Bilinear => noise_at_level(self.sampling.level),
-                // Used at full size only.
-                Interpolation::Bicubic => axis * axis,
+                Interpolation::Bilinear => 1.0,
+                // Neighbours of coarser levels are taken to go together in either interpolation.
+                Interpolation::Bicubic => axis * axis / noise_at_level(0),
             };
         let fitted = f64::from(self.noise.floor);
         if single > fitted && single < MAX_NOISE_UNDERESTIMATE * fitted {
             self.noise.floor = single as f32;
         }
-        // At coarser levels the residuals are mostly misalignment.
-        if self.sampling.level == 0 && self.active.len() > 1 {
+        // Before that, the residuals of coarser levels are mostly misalignment.
+        let is_aligned = self.sampling.level == 0 || self.sampling.variance_weighting;
+        if is_aligned && self.active.len() > 1 {
             self.denoiser = Some(spectrum.denoiser());
         }
         // The variance of a sample is that of a pixel times `β(0)²`.

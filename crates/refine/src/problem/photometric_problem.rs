@@ -240,7 +240,12 @@ impl<'a> PhotometricProblem<'a> {
         &self.context.calibration.tested
     }
 
-    /// Cost and normal equations at the initial unknowns, if they are known already; only once.
+    /// Cost and normal equations at the initial unknowns, if they are known already.
+    pub fn initial_linearisation(&self) -> Option<&Linearisation> {
+        self.initial.as_ref()
+    }
+
+    /// Takes cost and normal equations at the initial unknowns; only once.
     pub fn take_initial_linearisation(&mut self) -> Option<Linearisation> {
         self.initial.take()
     }

@@ -47,6 +47,7 @@ pub fn run<'a>(
     let sigmas = frame_sigmas(&context, &state.frames, &uncertainty);
     let mut rejections = state.frames.rejections.clone();
     judge(setup, &solution, &sigmas, &mut rejections);
+    state.frames.rejections.clone_from(&rejections);
     let calibration = setup.calibration_at(state);
     let datum = calibration.datum(&context.kappa);
     let held = setup.wall.as_ref().filter(|_| state.shape.is_none());
@@ -168,7 +169,8 @@ fn judge(
     rejections: &mut [Option<RejectionReason>],
 ) {
     let [width, height] = setup.input.cameras.size().map(f64::from);
-    let all_pixels = width * height;
+    // They are counted at the level of the solve.
+    let all_pixels = width * height / solution.problem.pixel_px().powi(2);
     for (k, rejection) in rejections.iter_mut().enumerate() {
         let evidence = FrameEvidence {
             rejection: rejection.take(),

@@ -123,13 +123,33 @@ impl SolvePlan {
         }
     }
 
+    /// The solve at full size.
+    pub fn at_full_size(self) -> Self {
+        Self {
+            sampling: Sampling {
+                level: 0,
+                ..self.sampling
+            },
+            ..self
+        }
+    }
+
     /// The solve in words, for the progress display and the timings.
     pub fn name(&self) -> String {
-        let Sampling { density, joint, .. } = self.sampling;
+        let Sampling {
+            density,
+            joint,
+            level,
+            ..
+        } = self.sampling;
+        let size = match level {
+            0 => String::new(),
+            level => format!(" of size 1/{}", 1 << level),
+        };
         match (joint, density) {
             (true, _) => "solve, jointly with the wall".to_owned(),
-            (false, 1.0) => "solve, a sample per pixel".to_owned(),
-            (false, density) => format!("solve, {density} samples per pixel"),
+            (false, 1.0) => format!("solve, a sample per pixel{size}"),
+            (false, density) => format!("solve, {density} samples per pixel{size}"),
         }
     }
 }

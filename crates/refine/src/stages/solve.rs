@@ -6,6 +6,7 @@ use crate::model::problem_error::ProblemError;
 use crate::options::{Photometry, RefineOptions};
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::hidden_bands::find_hidden_bands;
+use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::{self, Observation};
 use crate::solver::gauss_newton::{Solution, SolveState};
 use crate::solver::solve_levels::solve_levels;
@@ -14,9 +15,11 @@ use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::shape;
 use crate::stages::state::{Estimation, GlobalSolve, LastSolve, PipelineState};
+use crate::thresholds::last_solve::MAX_CURVATURE_SCATTER;
 use crate::tracking::lamp_search::find_lamp;
 use crate::tracking::shading_correction::correct_once;
 use crate::uncertainty::observability::UnobservableParameter;
+use crate::uncertainty::observed_curvature::{ObservedCurvature, observe_curvature};
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::validation::disagreement::reject_disagreeing_frames;
 
@@ -28,11 +31,14 @@ const MAX_LEARNING_SOLVES: usize = 4;
 /// A parameter that the last solve finds unobservable is fixed, and the solve planned again; as it
 /// is if the shape turns out to have other strengths ([`crate::stages::shape`]), or if residuals
 /// show model errors, with pixels that tell accordingly less ([`crate::uncertainty::model_error`]).
+/// On a wall so faint that steps in fine pixels are mostly noise, the last solve takes coarser ones
+/// ([`crate::uncertainty::observed_curvature`]), and is repeated in finer ones if it was the
+/// distance from the solution that made them so.
 ///
 /// # Errors
 /// A frame that cannot be read, equations without a solution.
 pub fn run<'a>(
-    plan: SolvePlan,
+    mut plan: SolvePlan,
     setup: &'a Setup<'a>,
     mut estimation: Estimation<'a>,
     session: &mut Session,
@@ -40,10 +46,11 @@ pub fn run<'a>(
     let state = &mut estimation.state;
     shape::begin(setup, state)?;
     let context = setup.context(state);
-    let Some(problem) = problem_of(&plan, setup, &context, state)? else {
+    let Some((level, problem)) = problem_of(&plan, setup, &context, state)? else {
         session.record_time("joint model of the wall");
         return Ok(estimation);
     };
+    plan.sampling.level = level;
     // Without overlap the prior is all there is to report.
     if problem.tiles() == 0 && state.frames.rejections.iter().all(Option::is_none) {
         return Ok(estimation);
@@ -75,6 +82,7 @@ pub fn run<'a>(
     reject_disagreeing_frames(&solution.linearisation.frames, &mut state.frames.rejections);
     state.levels.push(GlobalSolve {
         samples_per_pixel: plan.sampling.density,
+        level: plan.sampling.level,
         joint: solution.problem.is_joint(),
         record: solution.record.clone(),
     });
@@ -91,7 +99,9 @@ pub fn run<'a>(
         let dispersion = uncertainty
             .model_error
             .map_or(1.0, |found| found.dispersion);
-        if state.dispersion == 1.0 && dispersion > 1.0 {
+        if is_close_for_finer(&plan, setup, &context, state)? {
+            plan_again(&plan, setup.options, state);
+        } else if state.dispersion == 1.0 && dispersion > 1.0 {
             state.dispersion = dispersion;
             plan_again(&plan, setup.options, state);
         } else {
@@ -106,14 +116,54 @@ pub fn run<'a>(
     Ok(estimation)
 }
 
-/// Sets up the problem; none if it was to be joint and the wall is too smooth for that.
+/// Sets up the problem, and its level: if steps in fine pixels would be mostly noise, that at which
+/// pixels tell most. None if it was to be joint and the wall is too smooth for that.
 fn problem_of<'a>(
     plan: &SolvePlan,
     setup: &Setup,
     context: &EstimationContext<'a>,
     state: &PipelineState,
+) -> Result<Option<(usize, PhotometricProblem<'a>)>, ProblemError> {
+    let Sampling {
+        level,
+        joint,
+        variance_weighting,
+        ..
+    } = plan.sampling;
+    let Some(mut problem) = problem_at(plan.sampling, setup, context, state)? else {
+        return Ok(None);
+    };
+    // Solves before the last one only bring the estimate close, and the texture of a joint one is
+    // finer than pixels.
+    if joint || !variance_weighting {
+        return Ok(Some((level, problem)));
+    }
+    let (mut level, mut observed) = (level, observe_curvature_at_start(&problem)?);
+    while observed.scatter > MAX_CURVATURE_SCATTER && level < setup.coarsest_level() {
+        let sampling = Sampling {
+            level: level + 1,
+            ..plan.sampling
+        };
+        let Some(coarser) = problem_at(sampling, setup, context, state)? else {
+            break;
+        };
+        let of_coarser = observe_curvature_at_start(&coarser)?;
+        if of_coarser.information <= observed.information {
+            break;
+        }
+        (level, problem, observed) = (level + 1, coarser, of_coarser);
+    }
+    Ok(Some((level, problem)))
+}
+
+/// Sets up the problem with these samples; none if it was to be joint and the wall is too smooth
+/// for that.
+fn problem_at<'a>(
+    sampling: Sampling,
+    setup: &Setup,
+    context: &EstimationContext<'a>,
+    state: &PipelineState,
 ) -> Result<Option<PhotometricProblem<'a>>, ProblemError> {
-    let sampling = plan.sampling;
     let problem =
         PhotometricProblem::new(context, sampling, state.frames.window())?.with_shared_parameters();
     if sampling.joint && !problem.is_joint() {
@@ -126,6 +176,38 @@ fn problem_of<'a>(
         chosen.filter(|_| sampling.variance_weighting)
     };
     problem.exclude_outliers(density).map(Some)
+}
+
+/// Observes the curvature where the last solve starts.
+fn observe_curvature_at_start(
+    problem: &PhotometricProblem,
+) -> Result<ObservedCurvature, ProblemError> {
+    let pattern = problem.pattern();
+    let start = problem.initial_linearisation().and_then(|at| {
+        let factor = problem.symbolic().factorise(pattern, &at.normal, 0.0);
+        Some((at, factor.ok()?))
+    });
+    match start {
+        Some((at, factor)) => {
+            observe_curvature(problem, (at, &problem.initial_unknowns()), &factor)
+        }
+        None => Ok(ObservedCurvature::AS_PREDICTED),
+    }
+}
+
+/// True if finer pixels than those of a solve tell more at its end: at its beginning frames, lens or
+/// wall may have been too far off for that.
+fn is_close_for_finer(
+    plan: &SolvePlan,
+    setup: &Setup,
+    context: &EstimationContext,
+    state: &PipelineState,
+) -> Result<bool, ProblemError> {
+    if plan.sampling.level == 0 {
+        return Ok(false);
+    }
+    let found = problem_of(&plan.at_full_size(), setup, context, state)?;
+    Ok(found.is_some_and(|(level, _)| level < plan.sampling.level))
 }
 
 /// Solves the problem, from where an interrupted solve was.
@@ -242,7 +324,9 @@ fn has_solve_ahead(state: &PipelineState) -> bool {
 /// Plans the solve once more, after this one. Without the unobservable parameter the wall may look
 /// smooth, so a joint solve is preceded by one that is not.
 fn plan_again(plan: &SolvePlan, options: &RefineOptions, state: &mut PipelineState) {
-    state.stages.insert(1, Stage::Solve(*plan));
+    // Its level is found anew.
+    let plan = plan.at_full_size();
+    state.stages.insert(1, Stage::Solve(plan));
     if plan.sampling.joint {
         state
             .stages

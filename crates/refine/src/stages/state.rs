@@ -59,6 +59,8 @@ pub struct PipelineState {
 pub struct GlobalSolve {
     /// Wall samples per pixel along each axis.
     pub samples_per_pixel: f64,
+    /// Pyramid level of the pixels.
+    pub level: usize,
     /// True if the wall was solved for jointly with the poses.
     pub joint: bool,
     /// Its course.
@@ -69,6 +71,7 @@ impl From<GlobalSolve> for LevelReport {
     fn from(solve: GlobalSolve) -> Self {
         Self {
             samples_per_pixel: solve.samples_per_pixel,
+            level: solve.level,
             joint: solve.joint,
             solve: solve.record,
         }

@@ -12,7 +12,7 @@ use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::problem::score_scatter::ScoreScatter;
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::MAX_SIGMA_SHARE;
-use crate::uncertainty::observed_curvature::observe_curvature;
+use crate::uncertainty::observed_curvature::{ObservedCurvature, observe_curvature};
 use crate::uncertainty::shared_parameter_names::{PARAMETERS, ParameterKind};
 use nalgebra::{DMatrix, SMatrix};
 use serde::{Deserialize, Serialize};
@@ -55,23 +55,23 @@ impl Posterior {
     pub fn with_curvature(
         solution: &Solution,
         scatter: &ScoreScatter,
-    ) -> Result<(f64, Option<Self>), ProblemError> {
+    ) -> Result<(ObservedCurvature, Option<Self>), ProblemError> {
         let (problem, at) = (&solution.problem, &solution.linearisation);
         let borders = at.border.as_ref().zip(scatter.border.as_ref());
         let pattern = problem.pattern();
         // The factor is large; it is not kept.
         let factor = match problem.symbolic().factorise(pattern, &at.normal, 0.0) {
             Ok(factor) => factor,
-            Err(_) if borders.is_none() => return Ok((1.0, None)),
+            Err(_) if borders.is_none() => return Ok((ObservedCurvature::AS_PREDICTED, None)),
             Err(source) => return Err(problem.factor_error(source)),
         };
-        let curvature = observe_curvature(solution, &factor)?;
+        let curvature = observe_curvature(problem, (at, &solution.linearised_at), &factor)?;
         let posterior = borders.map(|(border, border_scatter)| {
             let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
             let (prior, prior_border) = problem.other_information(&solution.unknowns);
             let scatter = (reduce_to_shared(pattern, &scatter.blocks, border_scatter, &w)
                 + reduce_to_shared(pattern, &prior, &prior_border, &w))
-                / curvature.powi(2);
+                / curvature.effective().powi(2);
             Self { w, schur, scatter }
         });
         Ok((curvature, posterior))

@@ -12,6 +12,18 @@
 //! as weights fall where residuals grow (`ψ' ≤ ω`), and far less where the slopes of a faint wall
 //! are noise: then the score hardly changes, and the estimate is much less certain than H says.
 //!
+//! What the score changes by beyond this, `d = g(x + δ) − g(x) − P δ − κ (H − P) δ`, is that of the
+//! noise: samples that move by a pixel have other noise, and so has their product with slopes that
+//! are noise, too. Relative to the change that is expected it is
+//!
+//! `η = √(dᵀ H⁻¹ d / κ² δᵀ(H − P) δ)`.
+//!
+//! Contributions of tiles to d are independent, so that a share of one tile in n, which counts n
+//! times, shows n times the square. With a derivative `κ H (1 + N)`, N of the size η, a step leaves
+//! η of the error, and the variance of the estimate is `E[(1 + N)⁻²] ≈ 1 + 3 η²` times that with κ.
+//! On a faint wall η falls from one pyramid level to the next coarser one, where noise is less and
+//! goes together over more of the wall.
+//!
 //! Steps of the solve show the same along one direction each, most of them far from its end; those
 //! of the last ones are the weakest directions, which the prior determines.
 //!
@@ -19,12 +31,14 @@
 //! conditions", 1967; M. F. Hutchinson, "A stochastic estimator of the trace of the influence
 //! matrix for Laplacian smoothing splines", Communications in Statistics 18(3), 1989 (the signs).
 
+use crate::linear::normal_equations::{NormalEquations, Pattern};
 use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameStep;
+use crate::parameters::unknowns::Unknowns;
 use crate::problem::linearisation::Linearisation;
-use crate::solver::gauss_newton::Solution;
+use crate::problem::photometric_problem::PhotometricProblem;
 use crate::uncertainty::exposure_equations::POSE;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -33,16 +47,54 @@ use rand_chacha::ChaCha8Rng;
 /// times those of a good solution, and nothing is believed.
 const NO_CURVATURE: f64 = 1e-3;
 
-/// Observes κ at a solution; `factor`: of its normal matrix.
+/// The derivative of the score, over the normal matrix.
+#[derive(Clone, Copy, Debug)]
+pub struct ObservedCurvature {
+    /// Its mean κ.
+    pub mean: f64,
+    /// 1-σ η of its deviations from κ, over κ: root mean square over all directions.
+    pub scatter: f64,
+    /// What pixels tell of the pose of a frame if those of all others are known: inverse variance,
+    /// the geometric mean over frames and their unknowns, by which pyramid levels are compared.
+    pub information: f64,
+}
+
+impl ObservedCurvature {
+    /// Where the derivative is unknown, as of equations that are singular.
+    pub const AS_PREDICTED: Self = Self {
+        mean: 1.0,
+        scatter: 0.0,
+        information: 0.0,
+    };
+
+    /// Where the score does not change.
+    const NONE: Self = Self {
+        mean: NO_CURVATURE,
+        scatter: 0.0,
+        information: 0.0,
+    };
+
+    /// The derivative without scatter by which the variance of the estimate is the same.
+    pub fn effective(&self) -> f64 {
+        self.mean / (1.0 + self.scatter.powi(2)).sqrt()
+    }
+}
+
+/// Observes κ and η where the problem is linearised, `at` the unknowns `from`; `factor`: of the
+/// normal matrix there.
 ///
 /// # Errors
 /// A frame that has to be read again and cannot be.
-pub fn observe_curvature(solution: &Solution, factor: &Factor) -> Result<f64, ProblemError> {
-    let (problem, at) = (&solution.problem, &solution.linearisation);
-    let from = &solution.linearised_at;
-    let step = factor.step(&scores_with_random_signs(solution));
+pub fn observe_curvature(
+    problem: &PhotometricProblem,
+    (at, from): (&Linearisation, &Unknowns),
+    factor: &Factor,
+) -> Result<ObservedCurvature, ProblemError> {
+    let scores = scores_with_random_signs(problem, at);
+    let step = factor.step(&scores);
     let to = problem.stepped(from, &step, &Kappa::zeros());
-    let next = match problem.mean_change_share(at) {
+    let stride = problem.mean_change_share(at);
+    let next = match stride {
         Some(stride) => problem.linearise_change(at, (from, &to), stride)?,
         None => problem.linearise_at(&to)?,
     };
@@ -55,27 +107,70 @@ pub fn observe_curvature(solution: &Solution, factor: &Factor) -> Result<f64, Pr
     };
     others.normal.blocks = blocks;
     let (_, of_others, _) = others.predict(problem.pattern(), (&step, &no_shared));
-    let along = |gradient: &[FrameStep]| -> f64 {
-        let poses = step.iter().zip(gradient).take(from.frames.len());
-        poses
-            .map(|(step, g)| step.rows(0, POSE).dot(&g.rows(0, POSE)))
-            .sum()
-    };
-    let of_others = along(&of_others);
-    let change = along(&next.normal.gradient) - along(&at.normal.gradient);
-    let curvature = (change - of_others) / (along(&predicted) - of_others);
+    let frames = from.frames.len();
+    let observed = poses_part(frames, |k| {
+        next.normal.gradient[k] - at.normal.gradient[k] - of_others[k]
+    });
+    let expected = poses_part(frames, |k| predicted[k] - of_others[k]);
+    let along = |gradient: &[FrameStep]| dot(&step, gradient);
+    let mean = along(&observed) / along(&expected);
     // NaN, too, is none.
-    let has_any = curvature > NO_CURVATURE;
-    Ok(if has_any {
-        curvature.min(1.0)
-    } else {
-        NO_CURVATURE
-    })
+    if !(mean > NO_CURVATURE) {
+        return Ok(ObservedCurvature::NONE);
+    }
+    let mut beyond = vec![FrameStep::zeros(); step.len()];
+    for ((beyond, observed), expected) in beyond.iter_mut().zip(&observed).zip(&expected) {
+        *beyond = observed - expected * mean;
+    }
+    let square = -dot(&factor.step(&beyond), &beyond) / stride.unwrap_or(1) as f64;
+    let dispersion = -dot(&step[..frames], &scores) / (POSE * frames) as f64;
+    let curvature = ObservedCurvature {
+        mean: mean.min(1.0),
+        scatter: (square / (mean.powi(2) * along(&expected))).sqrt(),
+        information: 0.0,
+    };
+    let of_frames = information_of_frames(problem.pattern(), (&at.normal, &others.normal), frames);
+    let curvature = ObservedCurvature {
+        information: curvature.effective().powi(2) / dispersion * of_frames,
+        ..curvature
+    };
+    Ok(curvature)
+}
+
+/// Geometric mean of `det(H_kk − P_kk)^(1/6)` of the poses of all frames of which pixels tell all
+/// of it; `(H, P)`: normal equations, and the part of what is not pixels.
+fn information_of_frames(
+    pattern: &Pattern,
+    (normal, others): (&NormalEquations, &NormalEquations),
+    frames: usize,
+) -> f64 {
+    let logarithms = (0..frames).filter_map(|k| {
+        let own = pattern.block_index(k, k)?;
+        let of_pixels = normal.blocks[own] - others.blocks[own];
+        let determinant = of_pixels.fixed_view::<POSE, POSE>(0, 0).determinant();
+        (determinant > 0.0).then(|| determinant.ln() / POSE as f64)
+    });
+    let (sum, count) = logarithms.fold((0.0, 0.0), |(sum, count), ln| (sum + ln, count + 1.0));
+    f64::exp(sum / f64::max(count, 1.0))
+}
+
+/// Gradients of the frames, of their poses alone.
+fn poses_part(frames: usize, gradient: impl Fn(usize) -> FrameStep) -> Vec<FrameStep> {
+    let of_pose = |k| {
+        let mut part = FrameStep::zeros();
+        part.rows_mut(0, POSE).copy_from(&gradient(k).rows(0, POSE));
+        part
+    };
+    (0..frames).map(of_pose).collect()
+}
+
+/// Sum of the products of steps and gradients, as far as there are both.
+fn dot(steps: &[FrameStep], gradients: &[FrameStep]) -> f64 {
+    steps.iter().zip(gradients).map(|(s, g)| s.dot(g)).sum()
 }
 
 /// `z`, for every slot.
-fn scores_with_random_signs(solution: &Solution) -> Vec<FrameStep> {
-    let (problem, at) = (&solution.problem, &solution.linearisation);
+fn scores_with_random_signs(problem: &PhotometricProblem, at: &Linearisation) -> Vec<FrameStep> {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut scores = vec![FrameStep::zeros(); problem.pattern().columns()];
     for block in &at.block_gradients {
@@ -100,7 +195,7 @@ mod tests {
 
     /// Curvature at the coarser level, where the texture is not denoised, of pictures whose wall is
     /// multiplied by `contrast` and that have noise of `sigma` grey levels.
-    fn curvature_of(contrast: f32, sigma: f32) -> f64 {
+    fn curvature_of(contrast: f32, sigma: f32) -> ObservedCurvature {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let noise = Normal::new(0.0f32, sigma).unwrap();
         let ring = Ring::new(1e-4);
@@ -130,14 +225,29 @@ mod tests {
         let factor = problem
             .symbolic()
             .factorise(problem.pattern(), &at.normal, 0.0);
-        observe_curvature(&solution, &factor.unwrap()).unwrap()
+        let at_end = (at, &solution.linearised_at);
+        observe_curvature(problem, at_end, &factor.unwrap()).unwrap()
     }
 
     #[test]
     fn score_changes_as_predicted_only_where_there_is_texture() {
         let textured = curvature_of(1.0, 1.0);
-        assert!((0.8..=1.0).contains(&textured), "{textured}");
+        assert!((0.8..=1.0).contains(&textured.mean), "{textured:?}");
+        assert!(textured.scatter < 0.2, "{textured:?}");
         let noisy = curvature_of(0.0, 8.0);
-        assert!(noisy < 0.5, "{noisy}");
+        assert!(noisy.effective() < 0.5, "{noisy:?}");
+        assert!(noisy.scatter > 0.5, "{noisy:?}");
+    }
+
+    #[test]
+    fn scatter_of_the_curvature_makes_the_estimate_less_certain() {
+        let observed = ObservedCurvature {
+            mean: 0.9,
+            scatter: 0.5,
+            information: 1.0,
+        };
+        let expected = 0.9 / 1.25f64.sqrt();
+        assert!((observed.effective() - expected).abs() < 1e-12);
+        assert_eq!(ObservedCurvature::AS_PREDICTED.effective(), 1.0);
     }
 }

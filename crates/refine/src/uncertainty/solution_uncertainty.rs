@@ -57,7 +57,8 @@ impl SolutionUncertainty {
         let problem = &solution.problem;
         let frames = solution.unknowns.frames.len();
         let scatter = problem.score_scatter(&solution.linearisation);
-        let (curvature, posterior) = Posterior::with_curvature(solution, &scatter)?;
+        let (observed, posterior) = Posterior::with_curvature(solution, &scatter)?;
+        let curvature = observed.effective();
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
         let (prior, _) = problem.other_information(&solution.unknowns);
