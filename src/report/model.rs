@@ -85,7 +85,7 @@ pub struct ResultSummary {
     /// Number of frames whose pose rests on their pixels; null if refine's report is missing.
     #[serde(rename = "repaired")]
     pub photometric: Option<usize>,
-    /// Number of frames whose pose rests on the prior or is ambiguous.
+    /// Number of frames whose pose rests on the prior.
     pub flagged: Option<usize>,
     /// Median rotation angle between initial and refined pose, degrees.
     pub correction_rotation_deg: f64,

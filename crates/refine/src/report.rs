@@ -27,6 +27,8 @@ pub enum FrameFlag {
     Prior,
     /// The prior alone: the pixels allow two poses.
     Ambiguous,
+    /// The prior alone: the pixels fit, and tell less than was asked for.
+    Uncertain,
 }
 
 /// A pose in the report, as in a TUM file.

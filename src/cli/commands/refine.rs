@@ -269,7 +269,7 @@ pub fn run(
         outputs.commit()?;
         Ok((refined.report, json, files))
     })?;
-    // Frames that fit at two places are read rightly.
+    // Frames that fit at two places, or tell too little, are read rightly.
     if 2 * report.count_flagged(FrameFlag::Prior) > survey.frames.len() {
         warn_of_reading(&survey, terminal)?;
     }

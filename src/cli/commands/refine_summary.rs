@@ -250,7 +250,11 @@ fn warn_of_frames(report: &RefineReport, terminal: &Terminal) {
 
 /// Possible causes where no frame is photometric.
 fn explain_failure(report: &RefineReport) -> &'static str {
-    if 2 * report.count_flagged(FrameFlag::Ambiguous) > report.frames.len() {
+    if 2 * report.count_flagged(FrameFlag::Uncertain) > report.frames.len() {
+        "  no frame is photometric: frames fit each other, but the wall shows too little texture, \
+         or too much noise, for their places on it; --max-sigma-px accepts more uncertain ones, \
+         and more light, less compression or more overlap make them certain"
+    } else if 2 * report.count_flagged(FrameFlag::Ambiguous) > report.frames.len() {
         "  no frame is photometric: the wall repeats itself, and the initial poses are too \
          uncertain to tell its repetitions apart; more exact ones, with a smaller σ under \
          [prior], do"

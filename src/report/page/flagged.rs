@@ -24,7 +24,7 @@ pub fn section(data: &PageData) -> Option<Markup> {
         } @else {
             p {
                 "The poses of these " (count(flagged.len()))
-                " frames rest on the prior or are ambiguous."
+                " frames rest on the prior."
                 @if !others.is_empty() {
                     " The first " (shown.len()) " are shown with their pictures."
                 }
@@ -90,6 +90,7 @@ fn badge(flag: FrameFlag) -> Markup {
         FrameFlag::Photometric => ("good", "photometric"),
         FrameFlag::Prior => ("fair", "prior"),
         FrameFlag::Ambiguous => ("bad", "ambiguous"),
+        FrameFlag::Uncertain => ("fair", "uncertain"),
     };
     html! { span.(format!("flag {class}")) { (name) } }
 }

@@ -102,9 +102,8 @@ pub fn majority(rejections: &[Option<RejectionReason>]) -> Result<(), RejectionR
         !(rejection.as_ref()).is_some_and(RejectionReason::shows_nothing)
     };
     let shown = rejections.iter().filter(shows_something).count();
-    let fits = |rejection: &&Option<RejectionReason>| match rejection {
-        Some(RejectionReason::Uncertain { wall_px }) => wall_px.is_finite(),
-        rejection => rejection.is_none(),
+    let fits = |rejection: &&Option<RejectionReason>| {
+        rejection.as_ref().is_none_or(RejectionReason::is_uncertain)
     };
     let frames = rejections.iter().filter(fits).count();
     if frames > 1 && 2 * frames > shown {

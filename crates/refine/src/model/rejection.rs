@@ -89,6 +89,11 @@ impl RejectionReason {
         matches!(self, Self::Featureless | Self::Repeated(_))
     }
 
+    /// True if the image fits the other frames, and tells too little of its pose.
+    pub fn is_uncertain(&self) -> bool {
+        matches!(self, Self::Uncertain { wall_px } if wall_px.is_finite())
+    }
+
     /// True if the image shows a wall that does not fit the other frames.
     pub fn is_misfit(&self) -> bool {
         matches!(
@@ -192,8 +197,8 @@ impl fmt::Display for RejectionReason {
             ),
             Self::Uncertain { wall_px } => write!(
                 f,
-                "its position on the wall is uncertain by {wall_px:.1} px: too little texture, \
-                 or frames that do not match"
+                "its position on the wall is uncertain by {wall_px:.2} px, more than \
+                 --max-sigma-px allows: too little texture"
             ),
         }
     }

@@ -173,6 +173,7 @@ impl Placement {
             flag: match rejection {
                 None => FrameFlag::Photometric,
                 Some(RejectionReason::Ambiguous { .. }) => FrameFlag::Ambiguous,
+                Some(reason) if reason.is_uncertain() => FrameFlag::Uncertain,
                 Some(_) => FrameFlag::Prior,
             },
             other_pose: match rejection {
