@@ -208,8 +208,8 @@ impl<'a> PosesByName<'a> {
     }
 }
 
-/// A name without percent-encoding (`frame%2001.png`), as addresses have it, and with its accents in
-/// the letters, which macOS writes as signs of their own in some names of files.
+/// A name without percent-encoding (`frame%2001.png`), as addresses have it, and with its accents
+/// in the letters, which macOS writes as signs of their own in some names of files.
 fn decoded(name: &str) -> String {
     let plain = percent_decode_str(name).decode_utf8();
     plain.as_deref().unwrap_or(name).nfc().collect()
