@@ -95,3 +95,22 @@ fn a_strict_check_fails_where_there_is_a_warning() {
     std::fs::write(dark.join("frames/000003.png"), "no picture").unwrap();
     fail(&["check", text(&dark), "--strict"], 3);
 }
+
+/// Noise, wide turns and blur leave directions that no picture measures; readings whose prior is
+/// another are not the better for it.
+#[test]
+fn right_surveys_with_weak_pictures_get_no_advice() {
+    let scratch = tempfile::tempdir().unwrap();
+    for weak in [
+        ["--noise", "8", "--seed", "3"],
+        ["--turn-deg", "55", "--seed", "3"],
+        ["--motion-blur-px", "8", "--seed", "1"],
+    ] {
+        let size = ["--frames", "18", "--size", "160x120", "--supersample", "2"];
+        let wall = ["--wall", "concrete", "--force"];
+        simulate(scratch.path(), &[&size[..], &wall, &weak].concat());
+        let said = succeed(&["check", text(scratch.path()), "--json"]);
+        let check: serde_json::Value = serde_json::from_str(&said).unwrap();
+        assert_eq!(check["readings"], serde_json::Value::Null, "{weak:?}");
+    }
+}

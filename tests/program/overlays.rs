@@ -193,4 +193,15 @@ fn interlaced_frames_are_named_with_the_remedy() {
             "{said}"
         );
     }
+    // The points of a dithered picture comb between rows, and between columns as well.
+    let survey = dir.path().join("survey");
+    for entry in std::fs::read_dir(survey.join("frames")).unwrap() {
+        let path = entry.unwrap().path();
+        let mut picture = image::open(&path).unwrap().into_luma8();
+        image::imageops::dither(&mut picture, &image::imageops::BiLevel);
+        picture.save(&path).unwrap();
+    }
+    let said = tunnelstitch(&["check", text(&survey)]).stderr;
+    let said = String::from_utf8_lossy(&said).into_owned();
+    assert!(!said.contains("interlaced"), "{said}");
 }

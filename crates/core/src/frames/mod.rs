@@ -33,7 +33,7 @@ mod windows;
 mod write;
 
 pub use cache::FrameCache;
-pub use combing::comb_ratio;
+pub use combing::{CombAxis, comb_ratio};
 pub use decode::{colour_type, load_colour};
 pub use error::FrameError;
 pub use frame_file::{FrameFile, list_frames};

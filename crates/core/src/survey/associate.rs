@@ -5,6 +5,7 @@ use super::frame_times::from_names;
 use super::skipped_frame::SkippedFrame;
 use super::strangers::strangers_among;
 use crate::frames::FrameFile;
+use percent_encoding::percent_decode_str;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::ffi::OsStr;
@@ -106,8 +107,9 @@ fn count_remedy(file: &PoseFile, frames: &[FrameFile], times_s: Option<&[f64]>) 
 
 /// Associates poses by name: the name in the file of poses must equal the frame's path or its end.
 /// Where none does, its extension may be missing, then capitals may differ, then its extension may
-/// be that of another format of pictures, since frames are converted. Backslashes are slashes.
-/// Poses of other files are ignored, and frames without a pose have none.
+/// be that of another format of pictures, since frames are converted. Backslashes are slashes, and
+/// signs that one of the two has percent-encoded (`%20`) are those that they stand for. Poses of
+/// other files are ignored, and frames without a pose have none.
 ///
 /// # Errors
 /// A file without names; a frame with several poses.
@@ -176,7 +178,7 @@ impl<'a> PosesByName<'a> {
             stem: HashMap::new(),
         };
         for entry in &file.entries {
-            let name = composed(entry.name.as_deref().unwrap_or_default()).replace('\\', "/");
+            let name = decoded(entry.name.as_deref().unwrap_or_default()).replace('\\', "/");
             let base = name.rsplit('/').next().unwrap_or_default().to_owned();
             let lower = base.to_lowercase();
             let add = |poses: &mut HashMap<String, Vec<NamedPose<'a>>>, key: String| {
@@ -195,7 +197,7 @@ impl<'a> PosesByName<'a> {
 
     /// The poses whose names are most like that of a frame.
     fn of_frame(&self, frame: &FrameFile) -> &[NamedPose<'a>] {
-        let text = |part: Option<&OsStr>| composed(&part.unwrap_or_default().to_string_lossy());
+        let text = |part: Option<&OsStr>| decoded(&part.unwrap_or_default().to_string_lossy());
         let (name, stem) = (text(frame.path.file_name()), text(frame.path.file_stem()));
         let found = (self.exact.get(&name))
             .or_else(|| self.exact.get(&stem))
@@ -206,10 +208,11 @@ impl<'a> PosesByName<'a> {
     }
 }
 
-/// A name with its accents in the letters: macOS writes some names of files with accents of their
-/// own.
-fn composed(name: &str) -> String {
-    name.nfc().collect()
+/// A name without percent-encoding (`frame%2001.png`), as addresses have it, and with its accents
+/// in the letters, which macOS writes as signs of their own in some names of files.
+fn decoded(name: &str) -> String {
+    let plain = percent_decode_str(name).decode_utf8();
+    plain.as_deref().unwrap_or(name).nfc().collect()
 }
 
 /// A path without its root and `.` components.
@@ -381,6 +384,15 @@ mod tests {
             ("s/2.png", None),
         ] {
             assert_eq!(found(&names, path).unwrap(), expected, "{path}");
+        }
+        let addresses = ["file:///s/a%20b.png", "s%2Fcaf%C3%A9.png", "100%.png"];
+        for (path, expected) in [
+            ("s/a b.png", Some(10.0)),
+            ("s/a%20b.png", Some(10.0)),
+            ("s/café.png", Some(11.0)),
+            ("s/100%.png", Some(12.0)),
+        ] {
+            assert_eq!(found(&addresses, path).unwrap(), expected, "{path}");
         }
         // The most alike name counts, and where there are several, none.
         assert_eq!(found(&["A.png", "a.png"], "a.png").unwrap(), Some(11.0));

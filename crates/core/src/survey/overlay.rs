@@ -3,8 +3,8 @@
 use super::file::OverlayUse;
 use super::open::Survey;
 use crate::frames::{
-    FrameError, GreyImage, Mask, StaticPixels, StoredFrame, TemporalStatistics, comb_ratio,
-    find_static_pixels,
+    CombAxis, FrameError, GreyImage, Mask, StaticPixels, StoredFrame, TemporalStatistics,
+    comb_ratio, find_static_pixels,
 };
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::numerics::median::upper_median;
@@ -91,14 +91,18 @@ impl Survey {
         let decoded = chosen.as_slice().par_map(|frame| {
             let picture = StoredFrame::decode(&self.frames[*frame], width, height)?;
             let grey = picture.grey_with_clipped();
-            Ok((comb_ratio(&grey), TemporalStatistics::reduce(grey)))
+            let combs = [CombAxis::Rows, CombAxis::Columns].map(|axis| comb_ratio(&grey, axis));
+            Ok((combs, TemporalStatistics::reduce(grey)))
         });
         let decoded = decoded
             .into_iter()
             .collect::<Result<Vec<_>, FrameError>>()?;
-        let ratios: Vec<f64> = decoded.iter().filter_map(|(ratio, _)| *ratio).collect();
+        let ratios = |axis: usize| -> Vec<f64> {
+            let ratios = decoded.iter().filter_map(|(combs, _)| combs[axis]);
+            ratios.collect()
+        };
         let mut report = OverlayReport {
-            interlaced: is_interlaced(&ratios),
+            interlaced: is_combed(&ratios(0)) && !is_combed(&ratios(1)),
             ..OverlayReport::default()
         };
         let keeps = self.file.frames.overlay == Some(OverlayUse::Keep);
@@ -147,12 +151,13 @@ impl Survey {
     }
 }
 
-/// True if frames of these comb ratios are interlaced.
+/// True if frames of these comb ratios are combed, along rows or columns. Interlaced frames are
+/// along rows alone, dithered ones along both.
 ///
 /// The nominal rate of false alarms is below 10⁻⁶: progressive frames have ratios below 1,
 /// those of nothing but noise 1 with a standard deviation of 0.02 (at 320 × 240 px), six of which
 /// the median of four frames or more would have to deviate by.
-fn is_interlaced(ratios: &[f64]) -> bool {
+fn is_combed(ratios: &[f64]) -> bool {
     let above = ratios.iter().filter(|ratio| **ratio > 1.0).count();
     ratios.len() >= MIN_COMBED_FRAMES
         && above as f64 >= MIN_COMBED_SHARE * ratios.len() as f64
@@ -164,11 +169,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_are_interlaced_if_most_comb() {
-        assert!(is_interlaced(&[1.3, 1.5, 0.98, 1.4]));
-        assert!(!is_interlaced(&[1.3, 1.5, 0.9, 0.8]));
-        assert!(!is_interlaced(&[1.05; 12]));
-        assert!(!is_interlaced(&[1.5; 3]));
+    fn frames_are_combed_if_most_are() {
+        assert!(is_combed(&[1.3, 1.5, 0.98, 1.4]));
+        assert!(!is_combed(&[1.3, 1.5, 0.9, 0.8]));
+        assert!(!is_combed(&[1.05; 12]));
+        assert!(!is_combed(&[1.5; 3]));
     }
 
     #[test]

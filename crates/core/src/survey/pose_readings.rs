@@ -70,8 +70,6 @@ pub struct PoseReading {
     pub camera: CameraReading,
     /// Places by which the poses belong to later frames than given; earlier if it is negative.
     pub shift_frames: isize,
-    /// Radius of the tunnel over the one given.
-    pub radius_factor: f64,
 }
 
 impl PoseReading {
@@ -85,14 +83,7 @@ impl PoseReading {
             orientation: PictureOrientation::Stored,
             camera: CameraReading::AsGiven,
             shift_frames: 0,
-            radius_factor: 1.0,
         }
-    }
-
-    /// Factor of the errors of positions in the tunnel of the given radius, at most 1: wider ones
-    /// would excuse what the prior as given does not.
-    pub fn error_scale(&self) -> f64 {
-        self.radius_factor.recip().min(1.0)
     }
 
     /// True if the reading has another camera than given.
@@ -173,8 +164,8 @@ impl Survey {
     }
 
     /// Readings of a straight round tunnel with another radius. Pictures of it are those of the
-    /// given one, seen from positions that are scaled about its axis, as their errors are. Poses
-    /// without a scale say nothing of it.
+    /// given one, seen from positions that are scaled about its axis. Poses without a scale say
+    /// nothing of it.
     fn other_radii(&self, format: PoseFormat) -> impl Iterator<Item = PoseReading> {
         let tunnel = &self.file.tunnel;
         let is_straight = tunnel.centreline.is_none() && self.bend.is_none();
@@ -196,7 +187,6 @@ impl Survey {
             let initial = self.initial.iter().map(scaled).collect();
             let reading = PoseReading {
                 prior_nats,
-                radius_factor: factor,
                 ..PoseReading::of_poses(remedy, 1, initial)
             };
             is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)

@@ -5,7 +5,7 @@ use super::float::float;
 use super::format::PoseFormat;
 use super::pose_options::PoseFileOptions;
 use super::quaternion_order::QuaternionOrder;
-use super::{bundler, colmap, csv, euroc, kitti, pix4d, realitycapture, row, text, tum};
+use super::{bundler, colmap, csv, euroc, json_form, kitti, pix4d, realitycapture, row, text, tum};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::path::Path;
@@ -39,6 +39,13 @@ pub(super) fn detect_format(
     }
     if colmap::is_line(line) {
         return Ok(PoseFormat::Colmap);
+    }
+    if let Some(what) = json_form::explain(text) {
+        return Err(PoseError::OtherKind {
+            path: path.to_owned(),
+            line: None,
+            what,
+        });
     }
     let words = row::words(line).map_err(|what| PoseError::line(path, number, what))?;
     let numbers = words.iter().filter(|word| float(word).is_some()).count();

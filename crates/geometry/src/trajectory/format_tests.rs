@@ -535,7 +535,7 @@ fn wrong_lines_are_named_with_the_remedy() {
         // nerfstudio.
         ("{\"frames\": []}".into(), "holds no poses"),
         ("{\"frames\": [".into(), "line 1 column"),
-        ("{}".into(), ":1: in no known format"),
+        ("{}".into(), "it has no keys; JSON is read from nerfstudio"),
         (
             "{\"frames\": [{\"file_path\": \"a\", \"transform_matrix\": \
              [[1,0,0,0],[0,1,0,0],[0,0,2,0]]}]}"

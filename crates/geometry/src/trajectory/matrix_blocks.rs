@@ -7,7 +7,8 @@ use std::borrow::Cow;
 const ROWS: usize = 4;
 
 /// A text of nothing but several 4 × 4 matrices whose rows are lines of their own, with each matrix
-/// on the line of its first row; numbers in brackets without these. Other texts, and the numbers of
+/// on the line of its first row; numbers in brackets without these. A line of three integers may
+/// precede each matrix, as in trajectories of Open3D (`.log`). Other texts, and the numbers of
 /// lines, stay.
 pub(super) fn on_one_line(text: &str) -> Cow<'_, str> {
     let text = without_brackets(text);
@@ -29,11 +30,20 @@ pub(super) fn on_one_line(text: &str) -> Cow<'_, str> {
 fn rows(text: &str) -> Option<Vec<(usize, Vec<&str>)>> {
     let lines = text.lines().enumerate();
     let filled = lines.filter(|(_, line)| !line.trim().is_empty());
+    let filled = filled.map(|(place, line)| (place, line.split_whitespace().collect()));
+    let mut filled: Vec<(usize, Vec<&str>)> = filled.collect();
+    let is_counter = |(_, words): &(usize, Vec<&str>)| {
+        words.len() == 3 && words.iter().all(|word| word.parse::<usize>().is_ok())
+    };
+    if filled.iter().step_by(ROWS + 1).all(is_counter) {
+        let mut place = 0..;
+        filled.retain(|_| place.next().is_some_and(|place| place % (ROWS + 1) != 0));
+    }
+    let count = filled.len();
     let rows: Vec<(usize, Vec<&str>)> = filled
-        .map(|(place, line)| (place, line.split_whitespace().collect()))
-        .take_while(|(_, words): &(usize, Vec<&str>)| words.len() == ROWS)
+        .into_iter()
+        .take_while(|(_, words)| words.len() == ROWS)
         .collect();
-    let count = text.lines().filter(|line| !line.trim().is_empty()).count();
     let is_last = |words: &[&str]| {
         let numbers = words.iter().map(|word| float(word));
         numbers.eq([0.0, 0.0, 0.0, 1.0].map(Some))
@@ -74,6 +84,15 @@ mod tests {
         let printed = "[[1. 0. 0. 5.]\n [0. 1. 0. 6.]\n [0. 0. 1. 7.]\n [0. 0. 0. 1.]]\n";
         let expected = format!("{}\n\n\n\n", LINE.replace(' ', ". ") + ".");
         assert_eq!(on_one_line(&printed.repeat(2)), expected.repeat(2));
+    }
+
+    #[test]
+    fn counters_before_matrices_are_left_out() {
+        let text = format!("0 0 1\n{BLOCK}1 1 2\n{BLOCK}");
+        let expected = format!("\n{LINE}\n\n\n\n\n{LINE}\n\n\n\n");
+        assert_eq!(on_one_line(&text), expected);
+        let other = text.replace("1 1 2", "1 1 2.5");
+        assert_eq!(on_one_line(&other), other);
     }
 
     #[test]

@@ -8,7 +8,7 @@
 use super::error::PoseError;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
-use super::{rigid, text};
+use super::{json_form, rigid, text};
 use crate::files::json::number;
 use serde::Deserialize;
 use serde_json::Value;
@@ -51,7 +51,8 @@ struct Transform {
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
     let fail = |what: String| PoseError::file(path, what);
-    let data: SfmData = serde_json::from_str(text).map_err(|error| fail(error.to_string()))?;
+    let data: SfmData =
+        serde_json::from_str(text).map_err(|error| fail(json_form::mismatch(text, &error)))?;
     let poses = data.poses.iter();
     let poses: HashMap<String, &Transform> = poses
         .map(|pose| (pose.pose_id.to_string(), &pose.pose.transform))

@@ -51,6 +51,7 @@ mod format;
 pub mod gyro;
 mod iso_time;
 mod jitter;
+mod json_form;
 pub mod kitti;
 mod matrix_blocks;
 mod matrix_files;

@@ -8,7 +8,7 @@ use super::error::PoseError;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
 use super::stamped_pose::StampedPose;
-use super::{rigid, text};
+use super::{json_form, rigid, text};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -28,8 +28,8 @@ struct Frame {
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
     let fail = |what: String| PoseError::file(path, what);
-    let transforms: Transforms = serde_json::from_str(text)
-        .map_err(|error| fail(format!("is not transforms.json: {error}")))?;
+    let transforms: Transforms =
+        serde_json::from_str(text).map_err(|error| fail(json_form::mismatch(text, &error)))?;
     if let Some(scale) = transforms.applied_scale
         && scale != 1.0
     {

@@ -7,7 +7,7 @@
 use super::error::PoseError;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
-use super::{rigid, text};
+use super::{json_form, rigid, text};
 use serde::Deserialize;
 use std::collections::HashMap;
 use std::path::Path;
@@ -50,7 +50,8 @@ struct Placed {
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
     let fail = |what: String| PoseError::file(path, what);
-    let data: SfmData = serde_json::from_str(text).map_err(|error| fail(error.to_string()))?;
+    let data: SfmData =
+        serde_json::from_str(text).map_err(|error| fail(json_form::mismatch(text, &error)))?;
     let poses: HashMap<u64, Placed> = data
         .extrinsics
         .into_iter()

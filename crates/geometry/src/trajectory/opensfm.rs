@@ -7,7 +7,7 @@
 use super::error::PoseError;
 use super::pose::Pose;
 use super::pose_entry::PoseEntry;
-use super::so3;
+use super::{json_form, so3};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ struct Shot {
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
     let fail = |what: String| PoseError::file(path, what);
     let parts: Vec<Reconstruction> =
-        serde_json::from_str(text).map_err(|error| fail(error.to_string()))?;
+        serde_json::from_str(text).map_err(|error| fail(json_form::mismatch(text, &error)))?;
     if parts.len() > 1 {
         let counts: Vec<String> = parts
             .iter()

@@ -13,7 +13,8 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::Path;
 
-/// Reads a text file of any encoding that [`decode_text`] knows.
+/// Reads a text file of any encoding that [`decode_text`] knows, without the sign 26 that ends
+/// texts of DOS.
 ///
 /// # Errors
 /// An unreadable file, or one that is no such text.
@@ -22,7 +23,9 @@ pub fn read(path: &Path) -> Result<String, PoseError> {
         path: path.to_owned(),
         source,
     })?;
-    decode_text(&bytes).map_err(|what| PoseError::file(path, what))
+    let mut text = decode_text(&bytes).map_err(|what| PoseError::file(path, what))?;
+    text.truncate(text.trim_end_matches('\u{1a}').len());
+    Ok(text)
 }
 
 /// The lines with content and their 1-based numbers; blank lines and comments that begin with `#`

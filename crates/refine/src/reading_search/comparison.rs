@@ -57,9 +57,31 @@ impl Comparison {
         let for_it = telling
             .filter(|(nats, _)| **nats > self.min_pair_nats)
             .count();
-        evidence.iter().sum::<f64>() > self.least_nats
+        self.total_nats(&evidence) > self.least_nats
             && 4 * fitting >= 3 * self.of_given.len()
             && 4 * for_it >= 3 * all
+    }
+
+    /// Evidence of all pairs, nats, in which no pair that does not fit as given speaks louder for
+    /// a reading than the upper quartile of the telling ones: of weak pictures, some do not fit by
+    /// chance, in a right reading as well.
+    ///
+    /// Source: J. W. Tukey, "The future of data analysis", Annals of Mathematical Statistics 33(1),
+    /// 1962 (winsorised sums).
+    pub fn total_nats(&self, evidence: &[f64]) -> f64 {
+        let pairs = evidence.iter().zip(&self.telling);
+        let telling = pairs.filter(|(_, tells)| **tells).map(|(nats, _)| *nats);
+        let mut telling: Vec<f64> = telling.collect();
+        telling.sort_unstable_by(f64::total_cmp);
+        let below = telling.len() - telling.len() / 4;
+        let quartile = telling[..below].last().copied().unwrap_or(f64::INFINITY);
+        let pairs = evidence.iter().zip(&self.of_given);
+        pairs
+            .map(|(nats, given)| match given {
+                Some(_) => *nats,
+                None => nats.min(quartile),
+            })
+            .sum()
     }
 }
 
@@ -117,6 +139,25 @@ mod tests {
         assert!(!comparison.may_take(&[[fits(3.0); 6], [None; 6]].concat()));
         // Two of six speak against it, by too little to speak for it.
         assert!(!comparison.may_take(&[fits(20.0), fits(20.0)]));
+    }
+
+    /// Of eight pairs, two that do not fit as given are chance; three are not.
+    #[test]
+    fn a_quarter_of_the_pairs_does_not_decide() {
+        let odds = |unfit: usize| {
+            let comparison = Comparison {
+                of_given: [vec![None; unfit], vec![fits(3.0); 8 - unfit]].concat(),
+                telling: vec![true; 8],
+                least_nats: 9.5,
+                min_pair_nats: 0.0,
+            };
+            let reading = [fits(2.5); 8];
+            let nats = comparison.pair_nats(&reading, false);
+            (comparison.total_nats(&nats), comparison.may_take(&reading))
+        };
+        assert_eq!(odds(0), (4.0, false));
+        assert_eq!(odds(2), (4.0, false));
+        assert_eq!(odds(3), (3.0 * (MAX_DEVIATION_COST - 2.5) + 2.5, true));
     }
 
     /// Steps that are longer than planned fit a shorter focal length, but the pictures do not.

@@ -16,8 +16,7 @@ use tunnelstitch_core::frames::{FrameCache, FrameSet, Light, PictureOrientation,
 use tunnelstitch_core::progress::Silent;
 use tunnelstitch_core::survey::{PoseReading, Survey};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-use tunnelstitch_geometry::surface::mean_radius_m;
-use tunnelstitch_geometry::trajectory::{Jitter, StampedPose};
+use tunnelstitch_geometry::trajectory::StampedPose;
 
 /// The pictures of pairs of neighbouring frames.
 pub struct PicturePairs<'s> {
@@ -90,24 +89,9 @@ impl<'s> PicturePairs<'s> {
         };
         let rejections = turned.prescreened.rejections.clone();
         let states = FrameStates::at(&setup.prior.initial, rejections);
-        let density_nats = self.density_nats(reading, &options);
-        let is_wanted = |some: &[Option<Registered>]| is_wanted(&rarer(some, density_nats));
         let registered = register_pairs(&context, &options, &states, &self.firsts, is_wanted)?;
         self.turned = Some(turned);
-        Ok(rarer(&registered, density_nats))
-    }
-
-    /// Nats by which the density of a registered position is lower in a reading than as given;
-    /// negative, where its prior is narrower: `Σ ½ ln((s²σᵢ² + p²) / (σᵢ² + p²))`, `s` the
-    /// reading's scale of errors, σᵢ the 1-σ as given, and p that to which pictures tell positions.
-    fn density_nats(&self, reading: &PoseReading, options: &RefineOptions) -> f64 {
-        let range_m = mean_radius_m(self.survey.surface.as_ref());
-        let pictures_m = options.max_sigma_px * range_m / self.survey.cameras.of(0).fx;
-        let variance = |sigma_m: f64| sigma_m.powi(2) + pictures_m.powi(2);
-        let sigmas_m = self.survey.prior.translation_sigma_m.into_iter();
-        let ratios =
-            sigmas_m.map(|sigma_m| variance(reading.error_scale() * sigma_m) / variance(sigma_m));
-        0.5 * ratios.map(f64::ln).sum::<f64>()
+        Ok(registered)
     }
 
     /// The pictures as a reading turns them.
@@ -142,31 +126,15 @@ impl<'s> PicturePairs<'s> {
         initial: &'a [StampedPose],
         options: &'a RefineOptions,
     ) -> Result<Setup<'a>, RefineError> {
-        let given = self.survey.prior;
         let input = RefineInput {
             cameras: reading.camera.camera(self.survey.cameras.of(0)).into(),
             frames,
             initial,
-            prior: Jitter {
-                translation_sigma_m: given
-                    .translation_sigma_m
-                    .map(|sigma_m| reading.error_scale() * sigma_m),
-                ..given
-            },
             pose_gaps: &[],
             ..RefineInput::from(self.survey)
         };
         Setup::new(input, options)
     }
-}
-
-/// Registrations with a density that is lower by so many nats.
-fn rarer(registered: &[Option<Registered>], nats: f64) -> Registrations {
-    let rarer = |found: Registered| Registered {
-        deviation: found.deviation + nats,
-        ..found
-    };
-    registered.iter().map(|found| found.map(rarer)).collect()
 }
 
 /// The frames of pairs, each once and in their order.

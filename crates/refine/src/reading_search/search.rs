@@ -70,10 +70,12 @@ impl Found<'_> {
 /// A frame is registered on the wall that the one before it shows, as tracking does, from the
 /// reading's pose and within its prior. Where it is found in both readings, the evidence against
 /// the one given is by how much less the frame deviates from the prior, `½ eᵀΣ⁻¹e`, and, with
-/// another camera, by how much better it correlates. A reading is taken if three
-/// quarters of the pairs fit and speak for it, and its odds exceed the number of readings over the
-/// survey's rate of false alarms. There may be several: poses exactly as planned, seen from the
-/// tunnel's other end, are those of another convention.
+/// another camera, by how much better it correlates. The σ of the prior are the same in all
+/// readings, also of tunnels of another radius: pictures do not measure all of a pose, and a
+/// narrower prior holds the rest closer to its prediction, right or wrong. A reading is taken if
+/// three quarters of the pairs fit and speak for it, and its odds exceed the number of readings
+/// over the survey's rate of false alarms. There may be several: poses exactly as planned, seen
+/// from the tunnel's other end, are those of another convention.
 ///
 /// Poses of other frames are compared by the pairs that tell them ([`telling_pairs`]), all other
 /// readings by pairs that are evenly distributed.
@@ -198,7 +200,7 @@ fn compare<'r>(
     }
     let registered = pictures.register(reading, |some| comparison.may_take(some))?;
     let pair_nats = comparison.pair_nats(&registered, reading.changes_camera());
-    let log_odds = reading.prior_nats + pair_nats.iter().sum::<f64>();
+    let log_odds = reading.prior_nats + comparison.total_nats(&pair_nats);
     let is_taken = comparison.may_take(&registered) && log_odds > comparison.least_nats;
     Ok(is_taken.then(|| Found {
         reading,
@@ -246,7 +248,6 @@ mod tests {
             orientation: PictureOrientation::Stored,
             camera: CameraReading::AsGiven,
             shift_frames: 0,
-            radius_factor: 1.0,
         }
     }
 

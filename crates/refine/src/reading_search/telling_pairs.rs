@@ -106,7 +106,6 @@ mod tests {
             orientation: PictureOrientation::Stored,
             shift_frames,
             camera: CameraReading::AsGiven,
-            radius_factor: 1.0,
         }
     }
 

@@ -1,7 +1,7 @@
 //! The header of a table of poses.
 
 use super::pose_column::{ColumnMap, PoseColumn};
-use super::table::{records, separator, separator_or_blank, split};
+use super::table::{records, separator_or_blank, split};
 use super::title::Title;
 use crate::trajectory::text;
 
@@ -21,7 +21,8 @@ const MIN_POSE_COLUMNS: usize = 2;
 
 impl<'a> Header<'a> {
     /// Finds the header of a table of poses: its first line with content after a `sep=;`, or the
-    /// comment before it, if that has as many columns. `None` if neither names columns of poses.
+    /// comment before it, if that has as many columns. `None` if neither names columns of poses, or
+    /// if the comment is that of TUM: a time, a translation and a quaternion, separated by blanks.
     pub fn find(text: &'a str, map: &ColumnMap) -> Option<Self> {
         let first = Self::first_line(text)?;
         if is_header(first.line, first.separator, map) {
@@ -32,10 +33,11 @@ impl<'a> Header<'a> {
             .filter_map(|(index, line)| Some((index, line.trim().strip_prefix('#')?)))
             .last()?;
         let line = comment.trim_start_matches('#').trim();
-        let separator = separator(line);
+        let separator = separator_or_blank(line);
         let count = |line| split(line, separator).map_or(0, |record| record.len());
         let is_found = is_header(line, separator, map) && count(line) == count(first.line);
-        is_found.then_some(Self {
+        let is_tum = separator == b' ' && !begins_with_pose(line);
+        (is_found && !is_tum).then_some(Self {
             number: index + 1,
             line,
             separator,
@@ -76,6 +78,23 @@ fn is_header(line: &str, separator: u8, map: &ColumnMap) -> bool {
     record.iter().filter(is_pose).count() >= MIN_POSE_COLUMNS
 }
 
+/// True if a line of names separated by blanks has columns of a pose where TUM has the time, or a
+/// quaternion where it has the translation.
+fn begins_with_pose(line: &str) -> bool {
+    let is_any = |text: &str, columns: &[PoseColumn]| {
+        let title = Title::of(text);
+        columns.iter().any(|column| title.rank(*column).is_some())
+    };
+    let mut names = line.split_whitespace();
+    let first = names.next().is_some_and(|name| {
+        is_any(name, &PoseColumn::TRANSLATION) || is_any(name, &PoseColumn::QUATERNION)
+    });
+    first
+        || names
+            .next()
+            .is_some_and(|name| is_any(name, &PoseColumn::QUATERNION))
+}
+
 /// The separator that a line `sep=;` names.
 fn named_separator(line: &str) -> Option<u8> {
     let line = line.trim_matches('"');
@@ -86,5 +105,25 @@ fn named_separator(line: &str) -> Option<u8> {
         [] => Some(b'\t'),
         [separator] if separator.is_ascii_punctuation() => Some(*separator),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A comment of TUM's columns leaves the file to TUM; any other order is that of a table.
+    #[test]
+    fn a_comment_with_blanks_names_the_columns_of_another_order() {
+        let is_table = |comment: &str| {
+            let text = format!("# {comment}\n0 1 2 3 0 0 0 1\n");
+            Header::find(&text, &ColumnMap::default()).is_some()
+        };
+        assert!(is_table("timestamp qx qy qz qw tx ty tz"));
+        assert!(is_table("tx ty tz qx qy qz qw timestamp"));
+        assert!(!is_table("timestamp tx ty tz qx qy qz qw"));
+        assert!(!is_table("timestamp tx ty tz qw qx qy qz"));
+        assert!(!is_table("time x y z w x y z"));
+        assert!(!is_table("tx ty tz qx qy qz qw"));
     }
 }
