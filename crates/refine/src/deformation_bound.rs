@@ -182,7 +182,7 @@ fn bound_at(
     let at = problem.linearise_at(&problem.initial_unknowns())?;
     let factor = problem
         .symbolic()
-        .factorise(problem.pattern(), &at.normal, 0.0)
+        .factorise(&at.normal, 0.0)
         .map_err(|source| problem.factor_error(source))?;
     let information = ShapeInformation {
         schur: at.border.map(|border| border.eliminate(&factor, 0.0)),
@@ -235,8 +235,8 @@ impl Nodes {
 }
 
 /// The factorised information of all unknowns, of which the shape is looked at.
-struct ShapeInformation<'f> {
-    factor: Factor<'f>,
+struct ShapeInformation {
+    factor: Factor,
     /// The information of the shared parameters, if there are any.
     schur: Option<SchurComplement>,
     /// Slot of the shape's first block.
@@ -246,7 +246,7 @@ struct ShapeInformation<'f> {
 /// Sums of coefficients: a column each.
 type Sums = SMatrix<f64, FRAME_PARAMETERS, BATCH>;
 
-impl ShapeInformation<'_> {
+impl ShapeInformation {
     /// The bound; None if the shared parameters are not determined.
     fn bound(&self, model: &ShapeModel, nodes: &Nodes) -> Option<DeformationBound> {
         let at_nodes: Vec<Vec<ShapeStep>> = nodes

@@ -277,7 +277,7 @@ mod tests {
         }
         let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
         for lambda in [0.0, 0.1] {
-            let factor = symbolic.factorise(&pattern, &normal, lambda).unwrap();
+            let factor = symbolic.factorise(&normal, lambda).unwrap();
             let (step, shared) = border
                 .step(
                     &factor,
@@ -298,7 +298,7 @@ mod tests {
             assert_eq!(shared[4], 0.0);
         }
         // S⁻¹ is the shared block of the whole inverse, and H itself reduces to S.
-        let factor = symbolic.factorise(&pattern, &normal, 0.0).unwrap();
+        let factor = symbolic.factorise(&normal, 0.0).unwrap();
         let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
         let mirrored = |k: usize| {
             let mut block = normal.blocks[k];

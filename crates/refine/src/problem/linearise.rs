@@ -456,10 +456,7 @@ mod tests {
         let start = problem.linearise(&estimates).unwrap().cost;
         for _ in 0..6 {
             let at = problem.linearise(&estimates).unwrap();
-            let factor = problem
-                .symbolic()
-                .factorise(problem.pattern(), &at.normal, 0.0)
-                .unwrap();
+            let factor = problem.symbolic().factorise(&at.normal, 0.0).unwrap();
             let step = factor.step(&at.normal.gradient);
             estimates = estimates
                 .iter()

@@ -337,9 +337,7 @@ impl DampedGaussNewton {
         current: &Linearisation,
     ) -> Result<Option<(Vec<FrameStep>, Kappa)>, ProblemError> {
         let normal = &current.normal;
-        let factor = problem
-            .symbolic()
-            .factorise(problem.pattern(), normal, self.lambda);
+        let factor = problem.symbolic().factorise(normal, self.lambda);
         let is_last_resort = self.lambda >= 1.0;
         let factor = match factor {
             Ok(factor) => factor,

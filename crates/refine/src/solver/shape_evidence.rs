@@ -204,14 +204,14 @@ impl<'s> ShapeEquations<'s> {
     }
 
     /// The factor of the normal matrix for the strengths `sigmas_m`; None if it is singular.
-    fn factor(&self, sigmas_m: &[f64]) -> Option<Factor<'s>> {
+    fn factor(&self, sigmas_m: &[f64]) -> Option<Factor> {
         let mut changes = vec![0.0; self.pattern.columns()];
         let scales = self.shape.model.scales.iter().zip(sigmas_m);
         for ((scale, sigma_m), slots) in scales.zip(self.slots()) {
             changes[slots].fill(sigma_m.powi(-2) - scale.sigma_m.powi(-2));
         }
         let diagonal = |slot: usize, own: f64| own + changes[slot];
-        let factor = (self.symbolic).factorise_with(self.pattern, self.normal, diagonal);
+        let factor = (self.symbolic).factorise_with(self.normal, diagonal);
         factor.ok()
     }
 

@@ -45,7 +45,7 @@
 
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
-use crate::linear::sparse_cholesky::FactorError;
+use crate::linear::sparse_cholesky::{Factor, FactorError, SymbolicFactorisation};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::uncertainty::exposure_equations::{ExposurePattern, POSE};
 use crate::uncertainty::frame_sigma::FrameSigma;
@@ -153,23 +153,23 @@ const MIN_DETERMINED: f64 = 1e-6;
 
 /// Computes the inverse of the normal matrix and the dispersion at a solution.
 ///
-/// `normal`: H, with `tied` freedoms of the gauge tied; `scatter`: V of the pixels; `prior`: P; all
-/// on `pattern`, whose first `frames` slots are frames and the others the wall's shape.
-/// `curvature`: κ.
+/// `normal`: H, with its `factor` and with `tied` freedoms of the gauge tied; `scatter`: V of the
+/// pixels; `prior`: P; all on `pattern`, whose first `frames` slots are frames and the others the
+/// wall's shape. `curvature`: κ.
 ///
 /// # Errors
-/// [`FactorError`] if the normal matrix is singular.
+/// [`FactorError`] if the equations of the exposures are singular.
 pub fn compute_covariances(
     pattern: &Pattern,
     frames: usize,
-    normal: &NormalEquations,
+    (normal, factor): (&NormalEquations, &Factor),
     tied: usize,
     scatter: &[Block],
     prior: &[Block],
     curvature: f64,
 ) -> Result<NoiseCovariance, FactorError> {
     let of_exposures = traces_of_exposures(pattern, frames, normal, [scatter, prior])?;
-    let inverse = SelectedInverse::new(pattern, normal)?;
+    let inverse = SelectedInverse::new(factor);
     let [of_scatter, of_prior] = [scatter, prior].map(|of| trace_of_product(pattern, &inverse, of));
     let of_shape = (pattern.columns() - frames) * FRAME_PARAMETERS;
     let freedoms = (frames * POSE + of_shape - tied) as f64;
@@ -197,7 +197,9 @@ fn traces_of_exposures(
     matrices: [&[Block]; 2],
 ) -> Result<[f64; 2], FactorError> {
     let exposures = ExposurePattern::new(pattern, frames);
-    let inverse = SelectedInverse::new(&exposures.slots, &exposures.equations(pattern, normal))?;
+    let symbolic = SymbolicFactorisation::new(&exposures.slots)?;
+    let factor = symbolic.factorise(&exposures.equations(pattern, normal), 0.0)?;
+    let inverse = SelectedInverse::new(&factor);
     Ok(matrices.map(|of| {
         let of = exposures.blocks(pattern, of);
         trace_of_product(&exposures.slots, &inverse, &of)
@@ -224,6 +226,11 @@ fn trace_of_product(pattern: &Pattern, inverse: &SelectedInverse, blocks: &[Bloc
 mod tests {
     use super::*;
     use nalgebra::DMatrix;
+
+    fn factorise(pattern: &Pattern, normal: &NormalEquations) -> Factor {
+        let symbolic = SymbolicFactorisation::new(pattern).unwrap();
+        symbolic.factorise(normal, 0.0).unwrap()
+    }
 
     #[test]
     fn csv_has_a_line_per_frame_and_pair_and_39_columns() {
@@ -254,23 +261,25 @@ mod tests {
             normal.add_block(&pattern, k, k + 1, &(Block::identity() * -1.0));
         }
         let none = vec![Block::zeros(); pattern.blocks()];
+        let factor = factorise(&pattern, &normal);
+        let normal = (&normal, &factor);
         let at = |scatter: &[Block], prior: &[Block], curvature: f64| {
             let found =
-                compute_covariances(&pattern, 3, &normal, 0, scatter, prior, curvature).unwrap();
+                compute_covariances(&pattern, 3, normal, 0, scatter, prior, curvature).unwrap();
             let factor = found.variance_factor;
             let block = |j, k| found.inverse.block(j, k).unwrap() * factor;
             (factor, [block(0, 0), block(1, 1), block(0, 1)])
         };
-        let one = at(&normal.blocks, &none, 1.0);
+        let one = at(&normal.0.blocks, &none, 1.0);
         assert!((one.0 - 1.0).abs() < 1e-12);
-        let two = at(&normal.blocks, &normal.blocks, 1.0);
+        let two = at(&normal.0.blocks, &normal.0.blocks, 1.0);
         assert!((two.1[1] - one.1[1] * 2.0).norm() < 1e-12);
-        let bent = at(&normal.blocks, &normal.blocks, 0.5);
+        let bent = at(&normal.0.blocks, &normal.0.blocks, 0.5);
         assert!((bent.1[1] - one.1[1] * 5.0).norm() < 1e-12);
         assert!((one.1[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
         assert!((one.1[2][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
-        let mut exposed = normal.blocks.clone();
-        for (block, normal) in exposed.iter_mut().zip(&normal.blocks) {
+        let mut exposed = normal.0.blocks.clone();
+        for (block, normal) in exposed.iter_mut().zip(&normal.0.blocks) {
             let exposures = normal.fixed_view::<2, 2>(POSE, POSE) * 9.0;
             let mut part = block.fixed_view_mut::<2, 2>(POSE, POSE);
             part += exposures;
@@ -279,7 +288,7 @@ mod tests {
         assert!((same.0 - 1.0).abs() < 1e-12);
         // With the gauge tied, two of 18 freedoms are no freedoms.
         let tied =
-            compute_covariances(&pattern, 3, &normal, 2, &normal.blocks, &none, 1.0).unwrap();
+            compute_covariances(&pattern, 3, normal, 2, &normal.0.blocks, &none, 1.0).unwrap();
         assert!((tied.variance_factor - 18.0 / 16.0).abs() < 1e-12);
     }
 
@@ -307,7 +316,9 @@ mod tests {
         let mut normal = NormalEquations::zeros(&pattern);
         normal.blocks = blocks(&h);
         let none = vec![Block::zeros(); pattern.blocks()];
-        let found = compute_covariances(&pattern, 2, &normal, 0, &blocks(&q), &none, 1.0).unwrap();
+        let factor = factorise(&pattern, &normal);
+        let normal = (&normal, &factor);
+        let found = compute_covariances(&pattern, 2, normal, 0, &blocks(&q), &none, 1.0).unwrap();
         let poses: Vec<usize> = (0..2 * FRAME_PARAMETERS)
             .filter(|k| k % FRAME_PARAMETERS < POSE)
             .collect();

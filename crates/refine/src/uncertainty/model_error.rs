@@ -122,7 +122,7 @@ impl EstimateErrors {
         let symbolic = SymbolicFactorisation::new(&exposures.slots);
         let symbolic = symbolic.map_err(|source| problem.factor_error(source))?;
         let equations = exposures.equations(pattern, normal);
-        let of_exposures = symbolic.factorise(&exposures.slots, &equations, 0.0);
+        let of_exposures = symbolic.factorise(&equations, 0.0);
         let of_exposures = of_exposures.map_err(|source| problem.factor_error(source))?;
         let (prior, _) = problem.prior_information(&solution.unknowns);
         let Some(prior) = PriorRoot::of(pattern, &prior) else {
@@ -253,9 +253,9 @@ impl ModelErrorReport {
 
 /// The equations, and the scores of patches that are drawn from.
 struct System<'s> {
-    factor: &'s Factor<'s>,
+    factor: &'s Factor,
     /// Exposures, and the factor of their equations for known poses.
-    exposures: (&'s ExposurePattern, &'s Factor<'s>),
+    exposures: (&'s ExposurePattern, &'s Factor),
     posterior: Option<&'s Posterior>,
     scores: &'s PatchScores,
     prior: &'s PriorRoot,

@@ -6,6 +6,7 @@
 //! it another may be observed.
 
 use crate::linear::bordered_system::{BorderBlock, SchurComplement, SharedBlock, reduce_to_shared};
+use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
@@ -46,8 +47,9 @@ pub struct Posterior {
 
 impl Posterior {
     /// Observes the curvature κ ([`crate::uncertainty::observed_curvature`]) at a solution and
-    /// eliminates the poses; no posterior if no shared parameter was estimated. Where the normal
-    /// matrix is singular and none was, nothing is known of the poses, and κ is 1.
+    /// eliminates the poses: κ, the posterior if a shared parameter was estimated, and the factor
+    /// of the normal matrix. Where that is singular and none was, nothing is known of the poses,
+    /// and κ is 1.
     ///
     /// # Errors
     /// [`ProblemError::Factor`] if shared parameters were estimated and the poses' normal matrix is
@@ -55,14 +57,13 @@ impl Posterior {
     pub fn with_curvature(
         solution: &Solution,
         scatter: &ScoreScatter,
-    ) -> Result<(f64, Option<Self>), ProblemError> {
+    ) -> Result<(f64, Option<Self>, Option<Factor>), ProblemError> {
         let (problem, at) = (&solution.problem, &solution.linearisation);
         let borders = at.border.as_ref().zip(scatter.border.as_ref());
         let pattern = problem.pattern();
-        // The factor is large; it is not kept.
-        let factor = match problem.symbolic().factorise(pattern, &at.normal, 0.0) {
+        let factor = match problem.symbolic().factorise(&at.normal, 0.0) {
             Ok(factor) => factor,
-            Err(_) if borders.is_none() => return Ok((1.0, None)),
+            Err(_) if borders.is_none() => return Ok((1.0, None, None)),
             Err(source) => return Err(problem.factor_error(source)),
         };
         let curvature = observe_curvature(solution, &factor)?;
@@ -74,7 +75,7 @@ impl Posterior {
                 / curvature.powi(2);
             Self { w, schur, scatter }
         });
-        Ok((curvature, posterior))
+        Ok((curvature, posterior, Some(factor)))
     }
 
     /// Covariance `Σ_κ` of the `free` parameters, zero elsewhere; None if S is singular.

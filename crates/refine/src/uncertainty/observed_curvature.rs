@@ -127,9 +127,7 @@ mod tests {
         };
         let solution = solve(ring.problem_of(Sampling::of(1)), stopping).unwrap();
         let (problem, at) = (&solution.problem, &solution.linearisation);
-        let factor = problem
-            .symbolic()
-            .factorise(problem.pattern(), &at.normal, 0.0);
+        let factor = problem.symbolic().factorise(&at.normal, 0.0);
         observe_curvature(&solution, &factor.unwrap()).unwrap()
     }
 

@@ -57,27 +57,27 @@ impl SolutionUncertainty {
         let problem = &solution.problem;
         let frames = solution.unknowns.frames.len();
         let scatter = problem.score_scatter(&solution.linearisation);
-        let (curvature, posterior) = Posterior::with_curvature(solution, &scatter)?;
+        let (curvature, posterior, factor) = Posterior::with_curvature(solution, &scatter)?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
         let (prior, _) = problem.other_information(&solution.unknowns);
-        let of_noise = compute_covariances(
-            problem.pattern(),
-            frames,
-            &solution.linearisation.normal,
-            problem.constrained_gauge_freedoms(),
-            &scatter.blocks,
-            &prior,
-            curvature,
-        );
+        let of_noise = factor.as_ref().and_then(|factor| {
+            let covariances = compute_covariances(
+                problem.pattern(),
+                frames,
+                (&solution.linearisation.normal, factor),
+                problem.constrained_gauge_freedoms(),
+                &scatter.blocks,
+                &prior,
+                curvature,
+            );
+            covariances.ok()
+        });
         // Poses without a covariance still count; they are reported as uncertain.
-        let total = match of_noise {
-            Ok(of_noise) => {
-                let normal = &solution.linearisation.normal;
-                let factor = problem.symbolic().factorise(problem.pattern(), normal, 0.0);
-                let factor = factor.map_err(|source| problem.factor_error(source))?;
-                let posterior = posterior.as_ref();
+        let total = match factor.zip(of_noise) {
+            Some((factor, of_noise)) => {
                 let at_end = (&factor, curvature);
+                let posterior = posterior.as_ref();
                 let errors = EstimateErrors::find(solution, at_end, posterior, &of_noise, alpha)?;
                 if let (Some(shared), Some(errors)) = (&mut shared, &errors) {
                     *shared += errors.draws.of_shared();
@@ -96,7 +96,7 @@ impl SolutionUncertainty {
                     shared: of_shared.map(|(posterior, shared)| (posterior.w.clone(), shared)),
                 })
             }
-            Err(_) => None,
+            None => None,
         };
         let errors = total.as_ref().and_then(|total| total.errors.as_ref());
         let patches = errors.and_then(|errors| errors.patches);

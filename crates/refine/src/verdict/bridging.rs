@@ -115,12 +115,13 @@ impl Bridging<'_> {
         };
         for _ in 0..STEPS {
             let normal = linearise(estimates);
-            let factor = symbolic.factorise(&pattern, &normal, 0.0)?;
+            let factor = symbolic.factorise(&normal, 0.0)?;
             for (k, step) in gap.clone().zip(factor.step(&normal.gradient)) {
                 estimates[k] = estimates[k].retract(&step);
             }
         }
-        SelectedInverse::new(&pattern, &linearise(estimates))
+        let factor = symbolic.factorise(&linearise(estimates), 0.0)?;
+        Ok(SelectedInverse::new(&factor))
     }
 }
 
