@@ -235,8 +235,8 @@ impl Nodes {
 }
 
 /// The factorised information of all unknowns, of which the shape is looked at.
-struct ShapeInformation {
-    factor: Factor,
+struct ShapeInformation<'f> {
+    factor: Factor<'f>,
     /// The information of the shared parameters, if there are any.
     schur: Option<SchurComplement>,
     /// Slot of the shape's first block.
@@ -246,7 +246,7 @@ struct ShapeInformation {
 /// Sums of coefficients: a column each.
 type Sums = SMatrix<f64, FRAME_PARAMETERS, BATCH>;
 
-impl ShapeInformation {
+impl ShapeInformation<'_> {
     /// The bound; None if the shared parameters are not determined.
     fn bound(&self, model: &ShapeModel, nodes: &Nodes) -> Option<DeformationBound> {
         let at_nodes: Vec<Vec<ShapeStep>> = nodes

@@ -47,9 +47,20 @@ impl Front {
         self.rows.len() * FRAME_PARAMETERS
     }
 
+    /// Number of unknowns of columns and rows.
+    pub fn height(&self) -> usize {
+        self.width() + self.below()
+    }
+
     /// Number of values of its part of the factor: a column for each unknown of the columns.
     pub fn values(&self) -> usize {
-        self.width() * (self.width() + self.below())
+        self.width() * self.height()
+    }
+
+    /// First unknowns, among those of the parent, of the slots of the rows.
+    pub fn places_in(&self, parent: &Self) -> Vec<usize> {
+        let places = self.rows.iter().filter_map(|row| parent.index(*row));
+        places.map(|place| place * FRAME_PARAMETERS).collect()
     }
 
     /// Index of a position among columns and rows, slot by slot.
@@ -131,9 +142,20 @@ impl Fronts {
             .map_or(0, |front| front.start + front.values())
     }
 
+    /// Index of a front.
+    pub fn index_of(&self, front: &Front) -> usize {
+        self.front_of[front.columns.start as usize] as usize
+    }
+
     /// Slots of the columns of a front.
     pub fn slots(&self, front: &Front) -> &[u32] {
         &self.order[front.columns.start as usize..front.columns.end as usize]
+    }
+
+    /// Slots of the rows of a front.
+    pub fn row_slots(&self, front: &Front) -> Vec<u32> {
+        let rows = front.rows.iter();
+        rows.map(|row| self.order[*row as usize]).collect()
     }
 
     /// Front, row and column (slot by slot) of the block of two slots in the lower triangle of the

@@ -13,13 +13,14 @@
 
 use crate::linear::fronts::{Front, Fronts};
 use crate::linear::normal_equations::Block;
-use crate::linear::sparse_cholesky::Factor;
+use crate::linear::sparse_cholesky::{Factor, Panel};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
-use faer::{Accum, Mat, MatRef, Par};
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use std::sync::Arc;
 
 /// Blocks of `H⁻¹` on the pattern of the factor.
@@ -34,28 +35,31 @@ impl SelectedInverse {
     pub fn new(factor: &Factor) -> Self {
         let fronts = factor.fronts();
         let mut values = vec![0.0; fronts.values()];
-        // Z of columns and rows of fronts, until all of their children have taken theirs.
-        let mut known: Vec<(usize, Mat<f64>)> = Vec::new();
-        for (k, front) in fronts.all.iter().enumerate().rev() {
-            let of_rows = match front.parent {
-                Some(parent) => {
-                    let parent = parent as usize;
-                    // What is behind the parent has no children left.
-                    while known.pop_if(|(of, _)| *of < parent).is_some() {}
-                    let of_parent = known.last().map(|(_, z)| z.as_ref());
-                    of_parent.map_or_else(Mat::new, |z| rows_of(front, &fronts.all[parent], z))
-                }
-                None => {
-                    known.clear();
-                    Mat::new()
-                }
-            };
-            let z = inverse_of_front(factor, front, of_rows.as_ref());
-            let to = values[front.start..][..front.values()].iter_mut();
-            let columns = (0..front.width()).flat_map(|c| (0..z.nrows()).map(move |r| (r, c)));
-            to.zip(columns).for_each(|(to, at)| *to = z[at]);
-            known.push((k, z));
+        let mut children = vec![0; fronts.all.len()];
+        for parent in fronts.all.iter().filter_map(|front| front.parent) {
+            children[parent as usize] += 1;
         }
+        // Z of columns and rows of fronts whose children have not all taken theirs; the last is
+        // the parent of the front that is next.
+        let mut known: Vec<Mat<f64>> = Vec::new();
+        factor.for_each_front_reversed(|front, panel| {
+            let mut z = Mat::zeros(front.height(), front.height());
+            if let (Some(parent), Some(of_parent)) = (front.parent, known.last()) {
+                let parent = parent as usize;
+                copy_rows(front, &fronts.all[parent], of_parent.as_ref(), z.as_mut());
+                children[parent] -= 1;
+                if children[parent] == 0 {
+                    known.pop();
+                }
+            }
+            add_columns(front, panel, z.as_mut());
+            let panel = &mut values[front.start..][..front.values()];
+            MatMut::from_column_major_slice_mut(panel, front.height(), front.width())
+                .copy_from(z.as_ref().subcols(0, front.width()));
+            if children[fronts.index_of(front)] > 0 {
+                known.push(z);
+            }
+        });
         Self {
             fronts: fronts.clone(),
             values,
@@ -66,66 +70,58 @@ impl SelectedInverse {
     pub fn block(&self, row: usize, column: usize) -> Option<Block> {
         let (front, r, c, is_lower) = self.fronts.find(row, column)?;
         let front = &self.fronts.all[front];
-        let height = front.width() + front.below();
+        let height = front.height();
         let first = front.start + c * FRAME_PARAMETERS * height + r * FRAME_PARAMETERS;
         let block = Block::from_fn(|r, c| self.values[first + c * height + r]);
         Some(if is_lower { block } else { block.transpose() })
     }
 }
 
-/// `Z_rr` of the rows of a front by the Z of its parent.
-fn rows_of(front: &Front, parent: &Front, of_parent: MatRef<f64>) -> Mat<f64> {
-    let places: Vec<usize> = front
-        .rows
-        .iter()
-        .filter_map(|row| parent.index(*row))
-        .flat_map(|place| (0..FRAME_PARAMETERS).map(move |k| place * FRAME_PARAMETERS + k))
-        .collect();
-    Mat::from_fn(places.len(), places.len(), |r, c| {
-        of_parent[(places[r], places[c])]
-    })
+/// Copies `Z_rr` of the rows of a front from the Z of its parent.
+fn copy_rows(front: &Front, parent: &Front, of_parent: MatRef<f64>, mut z: MatMut<f64>) {
+    let places: Vec<usize> = front.places_in(parent);
+    let size = FRAME_PARAMETERS;
+    for (k, &column) in places.iter().enumerate() {
+        for (r, &row) in places.iter().enumerate() {
+            z.rb_mut()
+                .submatrix_mut(
+                    front.width() + r * size,
+                    front.width() + k * size,
+                    size,
+                    size,
+                )
+                .copy_from(of_parent.submatrix(row, column, size, size));
+        }
+    }
 }
 
-/// Z of columns and rows of a front by that of its rows.
-fn inverse_of_front(factor: &Factor, front: &Front, of_rows: MatRef<f64>) -> Mat<f64> {
-    let (own, below) = factor.panel(front);
-    let (width, height) = (front.width(), front.width() + front.below());
+/// Completes Z of a front, of which that of its rows is known.
+fn add_columns(front: &Front, (own, below): Panel, z: MatMut<f64>) {
     let mut y = below.to_owned();
     solve_upper_triangular_in_place(own.transpose(), y.as_mut().transpose_mut(), Par::Seq);
-    let mut z = Mat::zeros(height, height);
-    z.as_mut()
-        .submatrix_mut(width, width, height - width, height - width)
-        .copy_from(of_rows);
-    let mut of_columns = Mat::identity(width, width);
-    solve_lower_triangular_in_place(own, of_columns.as_mut(), Par::Seq);
-    solve_upper_triangular_in_place(own.transpose(), of_columns.as_mut(), Par::Seq);
-    let mut across = Mat::zeros(height - width, width);
+    let (mut of_columns, mut above, mut across, of_rows) =
+        z.split_at_mut(front.width(), front.width());
     matmul(
-        across.as_mut(),
+        across.rb_mut(),
         Accum::Replace,
-        of_rows,
+        of_rows.rb(),
         y.as_ref(),
         -1.0,
         Par::Seq,
     );
+    above.copy_from(across.rb().transpose());
+    of_columns.fill(0.0);
+    of_columns.rb_mut().diagonal_mut().fill(1.0);
+    solve_lower_triangular_in_place(own, of_columns.rb_mut(), Par::Seq);
+    solve_upper_triangular_in_place(own.transpose(), of_columns.rb_mut(), Par::Seq);
     matmul(
-        of_columns.as_mut(),
+        of_columns,
         Accum::Add,
         y.transpose(),
-        across.as_ref(),
+        across.rb(),
         -1.0,
         Par::Seq,
     );
-    z.as_mut()
-        .submatrix_mut(0, 0, width, width)
-        .copy_from(&of_columns);
-    z.as_mut()
-        .submatrix_mut(width, 0, height - width, width)
-        .copy_from(&across);
-    z.as_mut()
-        .submatrix_mut(0, width, width, height - width)
-        .copy_from(across.transpose());
-    z
 }
 
 #[cfg(test)]

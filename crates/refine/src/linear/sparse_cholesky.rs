@@ -1,22 +1,21 @@
 //! Sparse Cholesky factorisation of the normal matrix: dense ones of its fronts
 //! ([`crate::linear::fronts`]), by faer.
 
+use crate::linear::front_elimination::{FrontElimination, Matrix, Remainders};
 use crate::linear::fronts::{Front, Fronts};
 use crate::linear::normal_equations::{NormalEquations, Pattern};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::matmul::matmul;
-use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
-use faer::{
-    Accum, Mat, MatMut, MatRef, Par,
-    prelude::{Reborrow, ReborrowMut},
-};
+use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::SMatrix;
+use std::ops::Range;
 use std::sync::Arc;
+
+/// Values of L that are in memory at a time, 64 MiB.
+const MAX_VALUES: usize = 1 << 23;
 
 /// Failures of the factorisation of the normal matrix.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -52,7 +51,11 @@ impl SymbolicFactorisation {
     ///
     /// # Errors
     /// [`FactorError::NotPositiveDefinite`].
-    pub fn factorise(&self, normal: &NormalEquations, lambda: f64) -> Result<Factor, FactorError> {
+    pub fn factorise<'n>(
+        &self,
+        normal: &'n NormalEquations,
+        lambda: f64,
+    ) -> Result<Factor<'n>, FactorError> {
         self.factorise_with(normal, |_, own| own * (1.0 + lambda))
     }
 
@@ -60,160 +63,167 @@ impl SymbolicFactorisation {
     ///
     /// # Errors
     /// [`FactorError::NotPositiveDefinite`].
-    pub fn factorise_with(
+    pub fn factorise_with<'n>(
         &self,
-        normal: &NormalEquations,
+        normal: &'n NormalEquations,
         diagonal_of: impl Fn(usize, f64) -> f64,
-    ) -> Result<Factor, FactorError> {
+    ) -> Result<Factor<'n>, FactorError> {
+        self.factorise_within(MAX_VALUES, normal, diagonal_of)
+    }
+
+    /// Factorises H with another diagonal, and with `max_values` of L in memory at a time.
+    fn factorise_within<'n>(
+        &self,
+        max_values: usize,
+        normal: &'n NormalEquations,
+        diagonal_of: impl Fn(usize, f64) -> f64,
+    ) -> Result<Factor<'n>, FactorError> {
         let fronts = &self.fronts;
-        let mut values = vec![0.0; fronts.values()];
-        // What fronts leave, until their parents take it; those of a front's children are the last.
-        let mut left: Vec<(&Front, Mat<f64>)> = Vec::new();
-        for (k, front) in (0..).zip(&fronts.all) {
-            let panel = &mut values[front.start..][..front.values()];
-            let mut panel = MatMut::from_column_major_slice_mut(
-                panel,
-                front.width() + front.below(),
-                front.width(),
-            );
-            let mut update = Mat::zeros(front.below(), front.below());
-            add_equations(fronts, front, normal, &diagonal_of, panel.rb_mut());
-            while let Some((child, of_child)) = left.pop_if(|(child, _)| child.parent == Some(k)) {
-                add_update(
-                    front,
-                    child,
-                    of_child.as_ref(),
-                    panel.rb_mut(),
-                    update.as_mut(),
-                );
-            }
-            eliminate(front, panel, update.as_mut())?;
-            if front.parent.is_some() {
-                left.push((front, update));
+        let mut diagonal = vec![FrameStep::zeros(); fronts.order.len()];
+        for front in &fronts.all {
+            let blocks = fronts.blocks[front.blocks.clone()].iter();
+            for place in blocks.filter(|place| place.row == place.column) {
+                let slot = fronts.slots(front)[usize::from(place.column)] as usize;
+                let of_normal = normal.blocks[place.block as usize].diagonal();
+                diagonal[slot] = of_normal.map(|own| diagonal_of(slot, own));
             }
         }
+        let matrix = Matrix {
+            normal,
+            diagonal: &diagonal,
+        };
+        let mut elimination = FrontElimination::new(fronts, matrix, 0, Remainders::new());
+        let mut log_determinant = 0.0;
+        let mut stretches = Vec::new();
+        let mut values = Vec::new();
+        for range in stretches_of(fronts, max_values) {
+            let left = elimination.left().clone();
+            values.resize(values_of(&fronts.all[range.clone()]), 0.0);
+            let mut panels = &mut values[..];
+            for front in &fronts.all[range.clone()] {
+                let panel = panels.split_off_mut(..front.values()).unwrap_or_default();
+                elimination.eliminate_next(panel)?;
+                let pivots = panel.iter().step_by(front.height() + 1);
+                log_determinant += pivots.map(|pivot| 2.0 * pivot.ln()).sum::<f64>();
+            }
+            stretches.push((range, left));
+        }
         Ok(Factor {
-            fronts: self.fronts.clone(),
-            values,
+            fronts: fronts.clone(),
+            normal,
+            panels: (stretches.len() == 1).then_some(values),
+            stretches,
+            diagonal,
+            log_determinant,
         })
     }
 }
 
-/// Adds the blocks of the normal matrix in the columns of a front, on and below the diagonal.
-fn add_equations(
-    fronts: &Fronts,
-    front: &Front,
-    normal: &NormalEquations,
-    diagonal_of: &impl Fn(usize, f64) -> f64,
-    mut panel: MatMut<f64>,
-) {
-    for place in &fronts.blocks[front.blocks.clone()] {
-        let block = &normal.blocks[place.block as usize];
-        let (row, column) = (usize::from(place.row), usize::from(place.column));
-        let first = (row * FRAME_PARAMETERS, column * FRAME_PARAMETERS);
-        let is_diagonal = row == column;
-        for c in 0..FRAME_PARAMETERS {
-            for r in if is_diagonal { c } else { 0 }..FRAME_PARAMETERS {
-                let value = if place.is_transposed {
-                    block[(c, r)]
-                } else {
-                    block[(r, c)]
-                };
-                panel[(first.0 + r, first.1 + c)] = if is_diagonal && r == c {
-                    diagonal_of(fronts.slots(front)[column] as usize, value)
-                } else {
-                    value
-                };
+/// Fronts that follow each other and have `max_values` at the most, or are one.
+fn stretches_of(fronts: &Fronts, max_values: usize) -> Vec<Range<usize>> {
+    let mut stretches: Vec<Range<usize>> = Vec::new();
+    let mut values = 0;
+    for (k, front) in fronts.all.iter().enumerate() {
+        values += front.values();
+        match stretches.last_mut() {
+            Some(last) if values <= max_values => last.end = k + 1,
+            _ => {
+                values = front.values();
+                stretches.push(k..k + 1);
             }
         }
     }
+    stretches
 }
 
-/// Adds what a child leaves of its rows to columns (`panel`) and rows (`update`) of its parent.
-fn add_update(
-    front: &Front,
-    child: &Front,
-    of_child: MatRef<f64>,
-    mut panel: MatMut<f64>,
-    mut update: MatMut<f64>,
-) {
-    let rows = child.rows.iter().filter_map(|row| front.index(*row));
-    let rows: Vec<usize> = rows.map(|row| row * FRAME_PARAMETERS).collect();
-    let width = front.width();
-    for (k, &column) in rows.iter().enumerate() {
-        let (above, mut to) = if column < width {
-            (0, panel.rb_mut().subcols_mut(column, FRAME_PARAMETERS))
-        } else {
-            let columns = update
-                .rb_mut()
-                .subcols_mut(column - width, FRAME_PARAMETERS);
-            (width, columns)
-        };
-        let from = of_child.subcols(k * FRAME_PARAMETERS, FRAME_PARAMETERS);
-        for c in 0..FRAME_PARAMETERS {
-            let from = from
-                .col(c)
-                .try_as_col_major()
-                .map(|column| column.as_slice());
-            let to = to.rb_mut().col_mut(c).try_as_col_major_mut();
-            let Some((from, to)) = from.zip(to.map(|column| column.as_slice_mut())) else {
-                continue;
-            };
-            let from = from.chunks_exact(FRAME_PARAMETERS).skip(k);
-            for (from, row) in from.zip(&rows[k..]) {
-                let to = &mut to[row - above..][..FRAME_PARAMETERS];
-                to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
-            }
-        }
-    }
-}
-
-/// Eliminates the columns of a front: its `panel` becomes that of L, and what they leave of the
-/// rows is added to `update`. Upper triangles are not used.
-fn eliminate(front: &Front, panel: MatMut<f64>, update: MatMut<f64>) -> Result<(), FactorError> {
-    let scratch = cholesky_in_place_scratch::<f64>(front.width(), Par::Seq, Default::default());
-    let (mut own, mut below) = panel.split_at_row_mut(front.width());
-    cholesky_in_place(
-        own.rb_mut(),
-        Default::default(),
-        Par::Seq,
-        MemStack::new(&mut MemBuffer::new(scratch)),
-        Default::default(),
-    )
-    .map_err(|_| FactorError::NotPositiveDefinite)?;
-    solve_lower_triangular_in_place(own.rb(), below.rb_mut().transpose_mut(), Par::Seq);
-    triangular::matmul(
-        update,
-        BlockStructure::TriangularLower,
-        Accum::Add,
-        below.rb(),
-        BlockStructure::Rectangular,
-        below.rb().transpose(),
-        BlockStructure::Rectangular,
-        -1.0,
-        Par::Seq,
-    );
-    Ok(())
+/// Number of values of some fronts.
+fn values_of(fronts: &[Front]) -> usize {
+    fronts.iter().map(Front::values).sum()
 }
 
 /// A numeric factorisation.
-pub struct Factor {
+///
+/// A large L is not kept: what fronts leave at the beginning of a stretch of them is, from which
+/// the columns of the stretch are computed again, in less time than it takes to fill the memory of
+/// all of them.
+pub struct Factor<'n> {
     fronts: Arc<Fronts>,
-    /// Columns of L, front by front.
-    values: Vec<f64>,
+    normal: &'n NormalEquations,
+    diagonal: Vec<FrameStep>,
+    /// Stretches of fronts, each with what those before it leave.
+    stretches: Vec<(Range<usize>, Remainders)>,
+    /// Columns of L, front by front, if there is one stretch.
+    panels: Option<Vec<f64>>,
+    log_determinant: f64,
 }
 
-impl Factor {
+/// Columns of a front of L: those rows that are columns as well, and the rows below.
+pub type Panel<'f> = (MatRef<'f, f64>, MatRef<'f, f64>);
+
+impl Factor<'_> {
     /// Structure of the factor.
     pub fn fronts(&self) -> &Arc<Fronts> {
         &self.fronts
     }
 
-    /// Columns of a front: L of its columns, and L of the rows below.
-    pub fn panel(&self, front: &Front) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
-        let panel = &self.values[front.start..][..front.values()];
-        let width = front.width();
-        MatRef::from_column_major_slice(panel, width + front.below(), width).split_at_row(width)
+    /// Calls `visit` with every front and its columns of L, in the order of elimination.
+    pub fn for_each_front(&self, mut visit: impl FnMut(&Front, Panel)) {
+        let mut memory = Vec::new();
+        for stretch in &self.stretches {
+            let values = self.panels_of(stretch, &mut memory);
+            for front in &self.fronts.all[stretch.0.clone()] {
+                visit(front, self.panel(front, stretch, values));
+            }
+        }
+    }
+
+    /// Calls `visit` with every front and its columns of L, the last one first.
+    pub fn for_each_front_reversed(&self, mut visit: impl FnMut(&Front, Panel)) {
+        let mut memory = Vec::new();
+        for stretch in self.stretches.iter().rev() {
+            let values = self.panels_of(stretch, &mut memory);
+            for front in self.fronts.all[stretch.0.clone()].iter().rev() {
+                visit(front, self.panel(front, stretch, values));
+            }
+        }
+    }
+
+    /// Columns of L of a stretch, computed in `memory` if they are not kept.
+    fn panels_of<'v>(
+        &'v self,
+        (range, left): &(Range<usize>, Remainders),
+        memory: &'v mut Vec<f64>,
+    ) -> &'v [f64] {
+        if let Some(values) = &self.panels {
+            return values;
+        }
+        let matrix = Matrix {
+            normal: self.normal,
+            diagonal: &self.diagonal,
+        };
+        let fronts = &self.fronts.all[range.clone()];
+        memory.resize(values_of(fronts), 0.0);
+        let mut panels = &mut memory[..];
+        let mut again = FrontElimination::new(&self.fronts, matrix, range.start, left.clone());
+        for front in fronts {
+            let panel = panels.split_off_mut(..front.values()).unwrap_or_default();
+            let eliminated = again.eliminate_next(panel);
+            debug_assert!(eliminated.is_ok(), "it was eliminated before");
+        }
+        memory
+    }
+
+    /// Columns of a front, of the `values` of its stretch.
+    fn panel<'v>(
+        &self,
+        front: &Front,
+        (range, _): &(Range<usize>, Remainders),
+        values: &'v [f64],
+    ) -> Panel<'v> {
+        let start = front.start - self.fronts.all[range.start].start;
+        let panel = &values[start..][..front.values()];
+        MatRef::from_column_major_slice(panel, front.height(), front.width())
+            .split_at_row(front.width())
     }
 
     /// Computes `H⁻¹ B` of a matrix B with C columns, given and returned frame by frame.
@@ -222,18 +232,13 @@ impl Factor {
         blocks: &[SMatrix<f64, FRAME_PARAMETERS, C>],
     ) -> Vec<SMatrix<f64, FRAME_PARAMETERS, C>> {
         let mut solution = blocks.to_vec();
-        for front in &self.fronts.all {
-            let (own, below) = self.panel(front);
-            let mut x = gather(&solution, self.fronts.slots(front).iter());
+        let fronts = &self.fronts;
+        self.for_each_front(|front, (own, below)| {
+            let mut x = gather(&solution, fronts.slots(front));
             solve_lower_triangular_in_place(own, x.as_mut(), Par::Seq);
-            scatter(&mut solution, self.fronts.slots(front).iter(), x.as_ref());
-            let rows = || {
-                front
-                    .rows
-                    .iter()
-                    .map(|row| &self.fronts.order[*row as usize])
-            };
-            let mut of_rows = gather(&solution, rows());
+            scatter(&mut solution, fronts.slots(front), x.as_ref());
+            let rows = fronts.row_slots(front);
+            let mut of_rows = gather(&solution, &rows);
             matmul(
                 of_rows.as_mut(),
                 Accum::Add,
@@ -242,16 +247,11 @@ impl Factor {
                 -1.0,
                 Par::Seq,
             );
-            scatter(&mut solution, rows(), of_rows.as_ref());
-        }
-        for front in self.fronts.all.iter().rev() {
-            let (own, below) = self.panel(front);
-            let rows = front
-                .rows
-                .iter()
-                .map(|row| &self.fronts.order[*row as usize]);
-            let of_rows = gather(&solution, rows);
-            let mut x = gather(&solution, self.fronts.slots(front).iter());
+            scatter(&mut solution, &rows, of_rows.as_ref());
+        });
+        self.for_each_front_reversed(|front, (own, below)| {
+            let of_rows = gather(&solution, &fronts.row_slots(front));
+            let mut x = gather(&solution, fronts.slots(front));
             matmul(
                 x.as_mut(),
                 Accum::Add,
@@ -261,18 +261,14 @@ impl Factor {
                 Par::Seq,
             );
             solve_upper_triangular_in_place(own.transpose(), x.as_mut(), Par::Seq);
-            scatter(&mut solution, self.fronts.slots(front).iter(), x.as_ref());
-        }
+            scatter(&mut solution, fronts.slots(front), x.as_ref());
+        });
         solution
     }
 
     /// `log det H`.
     pub fn log_determinant(&self) -> f64 {
-        let pivots = self.fronts.all.iter().flat_map(|front| {
-            let (own, _) = self.panel(front);
-            (0..front.width()).map(move |k| own[(k, k)])
-        });
-        pivots.map(|pivot| 2.0 * pivot.ln()).sum()
+        self.log_determinant
     }
 
     /// Solves `H δ = −g` for the step δ.
@@ -283,12 +279,9 @@ impl Factor {
 }
 
 /// Rows of some slots as one matrix.
-fn gather<'s, const C: usize>(
-    blocks: &[SMatrix<f64, FRAME_PARAMETERS, C>],
-    slots: impl ExactSizeIterator<Item = &'s u32>,
-) -> Mat<f64> {
+fn gather<const C: usize>(blocks: &[SMatrix<f64, FRAME_PARAMETERS, C>], slots: &[u32]) -> Mat<f64> {
     let mut rows = Mat::zeros(slots.len() * FRAME_PARAMETERS, C);
-    for (k, slot) in slots.enumerate() {
+    for (k, slot) in slots.iter().enumerate() {
         let block = &blocks[*slot as usize];
         for c in 0..C {
             for r in 0..FRAME_PARAMETERS {
@@ -300,12 +293,12 @@ fn gather<'s, const C: usize>(
 }
 
 /// Writes rows of some slots back.
-fn scatter<'s, const C: usize>(
+fn scatter<const C: usize>(
     blocks: &mut [SMatrix<f64, FRAME_PARAMETERS, C>],
-    slots: impl Iterator<Item = &'s u32>,
+    slots: &[u32],
     rows: MatRef<f64>,
 ) {
-    for (k, slot) in slots.enumerate() {
+    for (k, slot) in slots.iter().enumerate() {
         let block = &mut blocks[*slot as usize];
         for c in 0..C {
             for r in 0..FRAME_PARAMETERS {
@@ -319,6 +312,7 @@ fn scatter<'s, const C: usize>(
 mod tests {
     use super::*;
     use crate::linear::normal_equations::Block;
+    use crate::linear::selected_inverse::SelectedInverse;
     use crate::linear::test_dense::random_equations;
 
     fn example() -> (Pattern, NormalEquations, nalgebra::DMatrix<f64>) {
@@ -367,12 +361,31 @@ mod tests {
         ));
     }
 
-    /// Prints time and size of the factor of long tunnels, twelve frames a turn, each of which
-    /// overlaps with two on either side and with three of each of the three turns beside.
+    /// A factor of which no front is kept is that of which all are.
+    #[test]
+    fn columns_are_computed_again_where_they_are_not_kept() {
+        let (pattern, normal, _) = random_equations(60, 5, 20.0);
+        let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
+        let solve = |max_values: usize| {
+            let factor = symbolic.factorise_within(max_values, &normal, |_, own| own);
+            let factor = factor.unwrap();
+            let inverse = SelectedInverse::new(&factor).block(30, 31);
+            (
+                factor.panels.is_some(),
+                (factor.step(&normal.gradient), inverse),
+            )
+        };
+        let (kept, computed_again) = (solve(usize::MAX), solve(0));
+        assert!(kept.0 && !computed_again.0);
+        assert_eq!(kept.1, computed_again.1);
+    }
+
+    /// Prints times of the factor of long tunnels and of a step by it, twelve frames a turn, each
+    /// of which overlaps with two on either side and with three of each of the three turns beside.
     #[test]
     #[ignore = "a measurement"]
     fn factor_of_a_long_tunnel() {
-        for frames in [10_000, 20_000, 40_000] {
+        for frames in [10_000, 100_000, 1_000_000] {
             let offsets = [1, 2, 11, 12, 13, 23, 24, 25, 35, 36, 37];
             let pairs = (0..frames).flat_map(|column: usize| {
                 let rows = offsets.iter().filter_map(move |by| column.checked_sub(*by));
@@ -385,15 +398,20 @@ mod tests {
                     let own = if row == column { 30.0 } else { -1.0 };
                     normal.add_block(&pattern, row, column, &(Block::identity() * own));
                 }
+                normal.gradient[column] = FrameStep::repeat(1.0);
             }
             let start = std::time::Instant::now();
             let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
             let analysed = start.elapsed();
             let factor = symbolic.factorise(&normal, 0.0).unwrap();
             let factored = start.elapsed() - analysed;
-            let kib = factor.values.len() * size_of::<f64>() / frames / 1024;
+            let step = factor.step(&normal.gradient);
+            let stepped = start.elapsed() - factored - analysed;
+            // Where a frame has all of its neighbours, the rows of the matrix add up to 8.
+            assert!((step[frames / 2] + FrameStep::repeat(1.0 / 8.0)).norm() < 1e-6);
             println!(
-                "{frames} frames: analysis {analysed:.2?}, factor {factored:.2?}, {kib} KiB a frame"
+                "{frames} frames: analysis {analysed:.2?}, factor {factored:.2?}, step \
+                 {stepped:.2?}"
             );
         }
     }

@@ -233,7 +233,7 @@ impl<'e> System<'e> {
     }
 
     /// The factor of the normal matrix; None if it is singular.
-    fn factorise(&self) -> Option<crate::linear::sparse_cholesky::Factor> {
+    fn factorise(&self) -> Option<crate::linear::sparse_cholesky::Factor<'_>> {
         self.symbolic.factorise(&self.normal, 0.0).ok()
     }
 

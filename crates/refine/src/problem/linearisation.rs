@@ -79,20 +79,8 @@ impl Linearisation {
         pattern: &Pattern,
         (step, shared): (&[FrameStep], &Kappa),
     ) -> (f64, Vec<FrameStep>, Kappa) {
-        let mut product = vec![FrameStep::zeros(); step.len()];
+        let mut product = pattern.product(&self.normal.blocks, step);
         let mut shared_product = Kappa::zeros();
-        for column in 0..pattern.columns() {
-            for &row in pattern.rows(column) {
-                let Some(index) = pattern.block_index(row, column) else {
-                    continue;
-                };
-                let block = &self.normal.blocks[index];
-                product[row] += block * step[column];
-                if row != column {
-                    product[column] += block.tr_mul(&step[row]);
-                }
-            }
-        }
         let gradient = &self.normal.gradient;
         let mut slope: f64 = gradient.iter().zip(step).map(|(g, step)| g.dot(step)).sum();
         if let Some(border) = &self.border {

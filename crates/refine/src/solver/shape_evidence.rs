@@ -204,7 +204,7 @@ impl<'s> ShapeEquations<'s> {
     }
 
     /// The factor of the normal matrix for the strengths `sigmas_m`; None if it is singular.
-    fn factor(&self, sigmas_m: &[f64]) -> Option<Factor> {
+    fn factor(&self, sigmas_m: &[f64]) -> Option<Factor<'s>> {
         let mut changes = vec![0.0; self.pattern.columns()];
         let scales = self.shape.model.scales.iter().zip(sigmas_m);
         for ((scale, sigma_m), slots) in scales.zip(self.slots()) {

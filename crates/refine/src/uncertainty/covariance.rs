@@ -198,7 +198,8 @@ fn traces_of_exposures(
 ) -> Result<[f64; 2], FactorError> {
     let exposures = ExposurePattern::new(pattern, frames);
     let symbolic = SymbolicFactorisation::new(&exposures.slots)?;
-    let factor = symbolic.factorise(&exposures.equations(pattern, normal), 0.0)?;
+    let equations = exposures.equations(pattern, normal);
+    let factor = symbolic.factorise(&equations, 0.0)?;
     let inverse = SelectedInverse::new(&factor);
     Ok(matrices.map(|of| {
         let of = exposures.blocks(pattern, of);
@@ -227,7 +228,7 @@ mod tests {
     use super::*;
     use nalgebra::DMatrix;
 
-    fn factorise(pattern: &Pattern, normal: &NormalEquations) -> Factor {
+    fn factorise<'n>(pattern: &Pattern, normal: &'n NormalEquations) -> Factor<'n> {
         let symbolic = SymbolicFactorisation::new(pattern).unwrap();
         symbolic.factorise(normal, 0.0).unwrap()
     }

@@ -54,10 +54,10 @@ impl Posterior {
     /// # Errors
     /// [`ProblemError::Factor`] if shared parameters were estimated and the poses' normal matrix is
     /// singular; a frame that has to be read again and cannot be.
-    pub fn with_curvature(
-        solution: &Solution,
+    pub fn with_curvature<'s>(
+        solution: &'s Solution,
         scatter: &ScoreScatter,
-    ) -> Result<(f64, Option<Self>, Option<Factor>), ProblemError> {
+    ) -> Result<(f64, Option<Self>, Option<Factor<'s>>), ProblemError> {
         let (problem, at) = (&solution.problem, &solution.linearisation);
         let borders = at.border.as_ref().zip(scatter.border.as_ref());
         let pattern = problem.pattern();

@@ -3,9 +3,10 @@
 //! The estimate is displaced by what noise may have done to it: by `δ = H⁻¹ z`, with
 //! `z = Σ ε_b g_b` of the gradients of blocks of the wall, and random signs ε. In the mean over the
 //! signs all directions count that pixels determine, each by its variance. There the score changes
-//! by `D δ`, where the equations predict `H δ`. With P the prior's and the points' part, in both,
+//! by `D δ`, where the equations predict `H δ`. With g the pixels' part of the score, and P the
+//! prior's and the points' part of H,
 //!
-//! `κ = δᵀ(g(x + δ) − g(x) − P δ) / δᵀ(H − P) δ`,
+//! `κ = δᵀ(g(x + δ) − g(x)) / δᵀ(H − P) δ`,
 //!
 //! over the poses' part of δ. Over all unknowns of all frames, what single tiles contribute by
 //! chance averages out, so a share of the tiles is enough. κ is about 0.9 for Gaussian residuals,
@@ -23,7 +24,6 @@ use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameStep;
-use crate::problem::linearisation::Linearisation;
 use crate::solver::gauss_newton::Solution;
 use crate::uncertainty::exposure_equations::POSE;
 use rand::{Rng, SeedableRng};
@@ -42,28 +42,18 @@ pub fn observe_curvature(solution: &Solution, factor: &Factor) -> Result<f64, Pr
     let from = &solution.linearised_at;
     let step = factor.step(&scores_with_random_signs(solution));
     let to = problem.stepped(from, &step, &Kappa::zeros());
-    let next = match problem.mean_change_share(at) {
-        Some(stride) => problem.linearise_change(at, (from, &to), stride)?,
-        None => problem.linearise_at(&to)?,
-    };
-    let no_shared = Kappa::zeros();
-    let (_, predicted, _) = at.predict(problem.pattern(), (&step, &no_shared));
-    let (blocks, border) = problem.other_information(from);
-    let mut others = Linearisation {
-        border: Some(border),
-        ..problem.zero_linearisation()
-    };
-    others.normal.blocks = blocks;
-    let (_, of_others, _) = others.predict(problem.pattern(), (&step, &no_shared));
+    let stride = problem.mean_change_share(at);
+    let change = problem.pixel_gradient_change(at, (from, &to), stride)?;
+    let predicted = problem.pattern().product(&at.normal.blocks, &step);
+    let (others, _) = problem.other_information(from);
+    let of_others = problem.pattern().product(&others, &step);
     let along = |gradient: &[FrameStep]| -> f64 {
         let poses = step.iter().zip(gradient).take(from.frames.len());
         poses
             .map(|(step, g)| step.rows(0, POSE).dot(&g.rows(0, POSE)))
             .sum()
     };
-    let of_others = along(&of_others);
-    let change = along(&next.normal.gradient) - along(&at.normal.gradient);
-    let curvature = (change - of_others) / (along(&predicted) - of_others);
+    let curvature = along(&change) / (along(&predicted) - along(&of_others));
     // NaN, too, is none.
     let has_any = curvature > NO_CURVATURE;
     Ok(if has_any {

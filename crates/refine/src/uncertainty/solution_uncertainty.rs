@@ -60,8 +60,8 @@ impl SolutionUncertainty {
         let (curvature, posterior, factor) = Posterior::with_curvature(solution, &scatter)?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
-        let (prior, _) = problem.other_information(&solution.unknowns);
         let of_noise = factor.as_ref().and_then(|factor| {
+            let (prior, _) = problem.other_information(&solution.unknowns);
             let covariances = compute_covariances(
                 problem.pattern(),
                 frames,
@@ -73,6 +73,8 @@ impl SolutionUncertainty {
             );
             covariances.ok()
         });
+        let overdispersions = compute_overdispersions(context, solution, &scatter);
+        drop(scatter);
         // Poses without a covariance still count; they are reported as uncertain.
         let total = match factor.zip(of_noise) {
             Some((factor, of_noise)) => {
@@ -115,7 +117,7 @@ impl SolutionUncertainty {
             },
             model_error: patches.map(|found| ModelErrorReport::new(&found, problem)),
             shared,
-            overdispersions: compute_overdispersions(context, solution, &scatter),
+            overdispersions,
             total,
             posterior,
         })

@@ -120,7 +120,8 @@ impl Bridging<'_> {
                 estimates[k] = estimates[k].retract(&step);
             }
         }
-        let factor = symbolic.factorise(&linearise(estimates), 0.0)?;
+        let normal = linearise(estimates);
+        let factor = symbolic.factorise(&normal, 0.0)?;
         Ok(SelectedInverse::new(&factor))
     }
 }
