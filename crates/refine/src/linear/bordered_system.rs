@@ -57,15 +57,6 @@ impl SharedBorder {
         self.gradient *= factor;
     }
 
-    /// Adds `factor` times another border.
-    pub fn add(&mut self, other: &Self, factor: f64) {
-        for (block, other) in self.frames.iter_mut().zip(&other.frames) {
-            *block += other * factor;
-        }
-        self.own += other.own * factor;
-        self.gradient += other.gradient * factor;
-    }
-
     /// Adds the outer product of a partial gradient to the scatter: `frames` (slot by slot) and
     /// `shared` are its parts.
     pub fn add_scatter(

@@ -14,8 +14,8 @@ use nalgebra::SMatrix;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Values of L that are in memory at a time, 64 MiB.
-const MAX_VALUES: usize = 1 << 23;
+/// Values of L that are in memory at a time, 32 MiB.
+const MAX_VALUES: usize = 1 << 22;
 
 /// Failures of the factorisation of the normal matrix.
 #[derive(Clone, Debug, thiserror::Error)]

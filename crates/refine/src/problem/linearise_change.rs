@@ -108,7 +108,9 @@ impl PhotometricProblem<'_> {
         if let Some((index, constraint)) = &at.constraint {
             next.normal.blocks[*index] -= constraint;
         }
-        next.add(&self.others(from), -1.0);
+        next.negate();
+        self.add_others(from, &mut next);
+        next.negate();
         self.add_share(from, stride, -factor, &mut next)?;
         self.fix_shared(&mut next);
         let (step, shared) = from.local(to);
@@ -173,22 +175,18 @@ impl PhotometricProblem<'_> {
                 }
             }
             None => {
-                at.block_gradients
-                    .iter()
-                    .for_each(|gradient| add(gradient, -1.0));
                 self.visit_share(to, TileShare::All, &mut |_, part| {
                     add(&part.gradient(), 1.0)
                 })?;
+                let mut others = self.zero_linearisation();
+                self.add_others(from, &mut others);
+                let before = at.normal.gradient.iter().zip(&others.normal.gradient);
+                for (change, (all, others)) in change.iter_mut().zip(before) {
+                    *change -= all - others;
+                }
             }
         }
         Ok(change)
-    }
-
-    /// All terms but those of the pixels.
-    fn others(&self, unknowns: &Unknowns) -> Linearisation {
-        let mut others = self.zero_linearisation();
-        self.add_others(unknowns, &mut others);
-        others
     }
 
     /// Removes the shared parameters from the equations that are not estimated.
@@ -201,22 +199,23 @@ impl PhotometricProblem<'_> {
     }
 
     /// The gradients of all blocks of the wall at the unknowns `to`; `at`: the equations at the
-    /// unknowns `from`.
+    /// unknowns `from`, whose own gradients of blocks are taken.
     ///
     /// # Errors
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
-    pub fn block_gradients(
+    pub fn take_block_gradients(
         &self,
-        at: &Linearisation,
+        at: &mut Linearisation,
         (from, to): (&Unknowns, &Unknowns),
     ) -> Result<Vec<BlockGradient>, ProblemError> {
+        let mut gradients = std::mem::take(&mut at.block_gradients);
         let (step, shared) = from.local(to);
         let moved = self.wall_step_px(&from.frames, &step, &shared);
         let step_px = moved.into_iter().fold(0.0, f64::max);
         let Some(stride) = self.change_share(at, step_px) else {
+            drop(gradients);
             return Ok(self.linearise_at(to)?.block_gradients);
         };
-        let mut gradients = at.block_gradients.clone();
         for (unknowns, factor) in [(from, -1.0), (to, 1.0)] {
             self.visit_share(unknowns, TileShare::OneIn(stride), &mut |k, part| {
                 gradients[k].add(&part.gradient(), factor * stride as f64);

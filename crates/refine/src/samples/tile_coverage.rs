@@ -22,7 +22,7 @@ const MAX_STRETCH_OBSERVATIONS: f64 = 1e6;
 const MAX_STRETCH_FRAMES: f64 = 256.0;
 /// Observations whose visibility is kept from one linearisation to the next; further ones are
 /// computed anew each time. Bounds the memory on long surveys.
-const MAX_KEPT_OBSERVATIONS: usize = 16_000_000;
+const MAX_KEPT_OBSERVATIONS: usize = 6_000_000;
 
 /// A stretch of the wall that is processed at once.
 #[derive(Clone, Debug)]

@@ -215,7 +215,9 @@ impl Visibility {
     pub fn is_excluded(&self, tile: TileId, frame: usize) -> bool {
         let key = |(tile, frame): (TileId, u32)| (tile.block(), tile.row, tile.column, frame);
         let searched = key((tile, frame as u32));
-        let found = self.excluded.binary_search_by_key(&searched, |excluded| key(*excluded));
+        let found = self
+            .excluded
+            .binary_search_by_key(&searched, |excluded| key(*excluded));
         found.is_ok()
     }
 

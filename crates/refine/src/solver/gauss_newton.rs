@@ -9,6 +9,7 @@ use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameEstimate, FrameStep};
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::linearisation::Linearisation;
+use crate::problem::patch_scores::PatchScores;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::solve_record::{SolveRecord, StepRecord};
 use crate::solver::stopping::{StopReason, Stopping};
@@ -52,6 +53,19 @@ impl Solution<'_> {
     pub fn tie_gauge(&mut self) {
         let normal = &mut self.linearisation.normal;
         self.problem.tie_gauge(&self.linearised_at.frames, normal);
+    }
+
+    /// The scores of patches of the wall at the unknowns. The gradients of its blocks are taken from
+    /// the linearisation.
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
+    pub fn take_patch_scores(&mut self) -> Result<PatchScores, ProblemError> {
+        let from_to = (&self.linearised_at, &self.unknowns);
+        let gradients = self
+            .problem
+            .take_block_gradients(&mut self.linearisation, from_to)?;
+        Ok(self.problem.patch_scores(&gradients))
     }
 
     /// Removes the shared parameters from the equations that are tested only.

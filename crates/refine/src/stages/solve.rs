@@ -58,7 +58,7 @@ pub fn run<'a>(
     }
     solution.remove_tested();
     solution.tie_gauge();
-    let uncertainty = uncertainty_of(setup, &context, state, &solution)?;
+    let uncertainty = uncertainty_of(setup, &context, state, &mut solution)?;
     let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
     let mut kappa = state.kappa;
     for parameter in &unobservable {
@@ -196,7 +196,7 @@ fn uncertainty_of(
     setup: &Setup,
     context: &EstimationContext,
     state: &PipelineState,
-    solution: &Solution,
+    solution: &mut Solution,
 ) -> Result<Option<SolutionUncertainty>, ProblemError> {
     let calibration = setup.calibration_at(state);
     if has_solve_ahead(state) {

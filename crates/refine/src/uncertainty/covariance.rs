@@ -154,8 +154,8 @@ const MIN_DETERMINED: f64 = 1e-6;
 /// Computes the inverse of the normal matrix and the dispersion at a solution.
 ///
 /// `normal`: H, with its `factor` and with `tied` freedoms of the gauge tied; `scatter`: V of the
-/// pixels; `prior`: P; all on `pattern`, whose first `frames` slots are frames and the others the
-/// wall's shape. `curvature`: κ.
+/// pixels; `prior`: makes P, once V is no longer in memory; all on `pattern`, whose first `frames`
+/// slots are frames and the others the wall's shape. `curvature`: κ.
 ///
 /// # Errors
 /// [`FactorError`] if the equations of the exposures are singular.
@@ -164,17 +164,27 @@ pub fn compute_covariances(
     frames: usize,
     (normal, factor): (&NormalEquations, &Factor),
     tied: usize,
-    scatter: &[Block],
-    prior: &[Block],
+    scatter: Vec<Block>,
+    prior: impl FnOnce() -> Vec<Block>,
     curvature: f64,
 ) -> Result<NoiseCovariance, FactorError> {
-    let of_exposures = traces_of_exposures(pattern, frames, normal, [scatter, prior])?;
+    let exposures = ExposurePattern::new(pattern, frames);
+    let of_exposures = inverse_of_exposures(pattern, &exposures, normal)?;
     let inverse = SelectedInverse::new(factor);
-    let [of_scatter, of_prior] = [scatter, prior].map(|of| trace_of_product(pattern, &inverse, of));
+    // tr(J⁻¹ E Q Eᵀ).
+    let trace = |blocks: &[Block]| {
+        trace_of_product(pattern, &inverse, blocks)
+            - trace_of_product(
+                &exposures.slots,
+                &of_exposures,
+                &exposures.blocks(pattern, blocks),
+            )
+    };
+    let of_pixels = trace(&scatter) / curvature.powi(2);
+    drop(scatter);
+    let of_prior = trace(&prior());
     let of_shape = (pattern.columns() - frames) * FRAME_PARAMETERS;
     let freedoms = (frames * POSE + of_shape - tied) as f64;
-    let of_pixels = (of_scatter - of_exposures[0]) / curvature.powi(2);
-    let of_prior = of_prior - of_exposures[1];
     // The freedoms that pixels determine, by their share of the information.
     let determined = freedoms - of_prior;
     Ok(NoiseCovariance {
@@ -189,22 +199,15 @@ pub fn compute_covariances(
     })
 }
 
-/// `tr(H_ee⁻¹ Q_ee)` of these matrices Q, e being the exposures.
-fn traces_of_exposures(
+/// `H_ee⁻¹`, e being the exposures.
+fn inverse_of_exposures(
     pattern: &Pattern,
-    frames: usize,
+    exposures: &ExposurePattern,
     normal: &NormalEquations,
-    matrices: [&[Block]; 2],
-) -> Result<[f64; 2], FactorError> {
-    let exposures = ExposurePattern::new(pattern, frames);
+) -> Result<SelectedInverse, FactorError> {
     let symbolic = SymbolicFactorisation::new(&exposures.slots)?;
     let equations = exposures.equations(pattern, normal);
-    let factor = symbolic.factorise(&equations, 0.0)?;
-    let inverse = SelectedInverse::new(&factor);
-    Ok(matrices.map(|of| {
-        let of = exposures.blocks(pattern, of);
-        trace_of_product(&exposures.slots, &inverse, &of)
-    }))
+    Ok(SelectedInverse::new(&symbolic.factorise(&equations, 0.0)?))
 }
 
 /// `tr(H⁻¹ Q)` of a symmetric matrix Q with the upper `blocks` on `pattern`.
@@ -265,8 +268,10 @@ mod tests {
         let factor = factorise(&pattern, &normal);
         let normal = (&normal, &factor);
         let at = |scatter: &[Block], prior: &[Block], curvature: f64| {
-            let found =
-                compute_covariances(&pattern, 3, normal, 0, scatter, prior, curvature).unwrap();
+            let scatter = scatter.to_vec();
+            let prior = || prior.to_vec();
+            let found = compute_covariances(&pattern, 3, normal, 0, scatter, prior, curvature);
+            let found = found.unwrap();
             let factor = found.variance_factor;
             let block = |j, k| found.inverse.block(j, k).unwrap() * factor;
             (factor, [block(0, 0), block(1, 1), block(0, 1)])
@@ -288,8 +293,8 @@ mod tests {
         let same = at(&exposed, &none, 1.0);
         assert!((same.0 - 1.0).abs() < 1e-12);
         // With the gauge tied, two of 18 freedoms are no freedoms.
-        let tied =
-            compute_covariances(&pattern, 3, normal, 2, &normal.0.blocks, &none, 1.0).unwrap();
+        let scatter = normal.0.blocks.clone();
+        let tied = compute_covariances(&pattern, 3, normal, 2, scatter, || none, 1.0).unwrap();
         assert!((tied.variance_factor - 18.0 / 16.0).abs() < 1e-12);
     }
 
@@ -319,7 +324,7 @@ mod tests {
         let none = vec![Block::zeros(); pattern.blocks()];
         let factor = factorise(&pattern, &normal);
         let normal = (&normal, &factor);
-        let found = compute_covariances(&pattern, 2, normal, 0, &blocks(&q), &none, 1.0).unwrap();
+        let found = compute_covariances(&pattern, 2, normal, 0, blocks(&q), || none, 1.0).unwrap();
         let poses: Vec<usize> = (0..2 * FRAME_PARAMETERS)
             .filter(|k| k % FRAME_PARAMETERS < POSE)
             .collect();

@@ -104,7 +104,7 @@ impl EstimateErrors {
     /// Finds the size of patches over which errors go together, and draws the errors that they and
     /// the prior make in the poses; those of the prior alone if the dispersion of single blocks is
     /// the largest. None if the prior leaves a pose free. At the end of the solve: the `factor` of
-    /// the normal matrix, and the `curvature` κ.
+    /// the normal matrix, the `curvature` κ, and the scores of the `finest` patches.
     ///
     /// # Errors
     /// [`ProblemError`]: a frame that cannot be read, a singular normal matrix.
@@ -112,7 +112,7 @@ impl EstimateErrors {
         solution: &Solution,
         (factor, curvature): (&Factor, f64),
         posterior: Option<&Posterior>,
-        of_noise: &NoiseCovariance,
+        (of_noise, finest): (&NoiseCovariance, &PatchScores),
         alpha: f64,
     ) -> Result<Option<Self>, ProblemError> {
         let problem = &solution.problem;
@@ -137,15 +137,11 @@ impl EstimateErrors {
             slots: pattern.columns(),
             frames,
         };
-        let from_to = (&solution.linearised_at, &solution.unknowns);
-        let gradients = problem.block_gradients(&solution.linearisation, from_to)?;
-        let finest = problem.patch_scores(&gradients);
-        drop(gradients);
         let mut doubled: Option<PatchScores> = None;
         let mut finest_dispersion = None;
         let mut largest: Option<(Option<PatchScores>, Patches)> = None;
         for blocks in PATCH_BLOCKS {
-            let scores = doubled.as_ref().unwrap_or(&finest);
+            let scores = doubled.as_ref().unwrap_or(finest);
             let dispersion = system.quadratic(scores, curvature) / of_noise.determined;
             finest_dispersion.get_or_insert(dispersion);
             let before = largest.as_ref().map_or(0.0, |l| l.1.dispersion);
@@ -157,11 +153,9 @@ impl EstimateErrors {
             doubled = Some(next);
         }
         drop(doubled);
-        let draw =
-            |scores: &PatchScores, posterior, curvature| system.draw(scores, posterior, curvature);
         Ok(Some(match largest {
             Some((scores, patches)) => Self {
-                draws: draw(scores.as_ref().unwrap_or(&finest), posterior, curvature),
+                draws: system.draw(scores.as_ref().unwrap_or(finest), posterior, curvature),
                 patches: Some(patches),
                 noise: None,
             },
@@ -171,9 +165,9 @@ impl EstimateErrors {
                 let scale = if share > 0.0 { share.sqrt() } else { 1.0 };
                 let has_shape = pattern.columns() > frames;
                 Self {
-                    draws: draw(&PatchScores::default(), None, curvature),
+                    draws: system.draw(&PatchScores::default(), None, curvature),
                     patches: None,
-                    noise: has_shape.then(|| draw(&finest, posterior, curvature * scale)),
+                    noise: has_shape.then(|| system.draw(finest, posterior, curvature * scale)),
                 }
             }
         }))

@@ -66,7 +66,7 @@ impl Posterior {
             Err(_) if borders.is_none() => return Ok((1.0, None, None)),
             Err(source) => return Err(problem.factor_error(source)),
         };
-        let curvature = observe_curvature(solution, &factor)?;
+        let curvature = observe_curvature(solution, &factor, &scatter.signed)?;
         let posterior = borders.map(|(border, border_scatter)| {
             let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
             let (prior, prior_border) = problem.other_information(&solution.unknowns);

@@ -26,21 +26,23 @@ use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameStep;
 use crate::solver::gauss_newton::Solution;
 use crate::uncertainty::exposure_equations::POSE;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// Curvature of a solution whose score does not change, or the wrong way: with it σ are a thousand
 /// times those of a good solution, and nothing is believed.
 const NO_CURVATURE: f64 = 1e-3;
 
-/// Observes κ at a solution; `factor`: of its normal matrix.
+/// Observes κ at a solution; `factor`: of its normal matrix, `scores`: z of every slot.
 ///
 /// # Errors
 /// A frame that has to be read again and cannot be.
-pub fn observe_curvature(solution: &Solution, factor: &Factor) -> Result<f64, ProblemError> {
+pub fn observe_curvature(
+    solution: &Solution,
+    factor: &Factor,
+    scores: &[FrameStep],
+) -> Result<f64, ProblemError> {
     let (problem, at) = (&solution.problem, &solution.linearisation);
     let from = &solution.linearised_at;
-    let step = factor.step(&scores_with_random_signs(solution));
+    let step = factor.step(scores);
     let to = problem.stepped(from, &step, &Kappa::zeros());
     let stride = problem.mean_change_share(at);
     let change = problem.pixel_gradient_change(at, (from, &to), stride)?;
@@ -63,21 +65,6 @@ pub fn observe_curvature(solution: &Solution, factor: &Factor) -> Result<f64, Pr
     })
 }
 
-/// `z`, for every slot.
-fn scores_with_random_signs(solution: &Solution) -> Vec<FrameStep> {
-    let (problem, at) = (&solution.problem, &solution.linearisation);
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut scores = vec![FrameStep::zeros(); problem.pattern().columns()];
-    for block in &at.block_gradients {
-        let sign = if rng.random() { 1.0 } else { -1.0 };
-        let scale = sign * problem.information();
-        for (slot, gradient) in block.slots.iter().zip(&block.slot_gradients) {
-            scores[*slot] += gradient * scale;
-        }
-    }
-    scores
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -85,6 +72,8 @@ mod tests {
     use crate::samples::sampling::Sampling;
     use crate::solver::argmin_glue::solve;
     use crate::solver::stopping::Stopping;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, Normal};
     use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
 
@@ -118,7 +107,8 @@ mod tests {
         let solution = solve(ring.problem_of(Sampling::of(1)), stopping).unwrap();
         let (problem, at) = (&solution.problem, &solution.linearisation);
         let factor = problem.symbolic().factorise(&at.normal, 0.0);
-        observe_curvature(&solution, &factor.unwrap()).unwrap()
+        let scores = problem.score_scatter(at).signed;
+        observe_curvature(&solution, &factor.unwrap(), &scores).unwrap()
     }
 
     #[test]

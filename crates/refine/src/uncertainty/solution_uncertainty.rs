@@ -40,7 +40,8 @@ pub struct SolutionUncertainty {
 }
 
 impl SolutionUncertainty {
-    /// Computes the uncertainty of a solution, with the free parameters of `calibration`;
+    /// Computes the uncertainty of a solution, of which the gradients of the blocks of the wall are
+    /// taken, with the free parameters of `calibration`;
     /// `context`: with the solution's own κ and shape; `unseen`: errors by what is
     /// not seen of the wall's shape; `alpha`: rate of false alarms.
     ///
@@ -49,38 +50,40 @@ impl SolutionUncertainty {
     /// singular.
     pub fn at(
         context: &EstimationContext,
-        solution: &Solution,
+        solution: &mut Solution,
         calibration: &Calibration,
         unseen: &UnseenErrors,
         alpha: f64,
     ) -> Result<Self, ProblemError> {
+        let scatter = solution.problem.score_scatter(&solution.linearisation);
+        let finest = solution.take_patch_scores()?;
+        let solution = &*solution;
         let problem = &solution.problem;
         let frames = solution.unknowns.frames.len();
-        let scatter = problem.score_scatter(&solution.linearisation);
         let (curvature, posterior, factor) = Posterior::with_curvature(solution, &scatter)?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
+        let overdispersions = compute_overdispersions(context, solution, &scatter);
+        context.frames.release_pyramids();
         let of_noise = factor.as_ref().and_then(|factor| {
-            let (prior, _) = problem.other_information(&solution.unknowns);
             let covariances = compute_covariances(
                 problem.pattern(),
                 frames,
                 (&solution.linearisation.normal, factor),
                 problem.constrained_gauge_freedoms(),
-                &scatter.blocks,
-                &prior,
+                scatter.blocks,
+                || problem.other_information(&solution.unknowns).0,
                 curvature,
             );
             covariances.ok()
         });
-        let overdispersions = compute_overdispersions(context, solution, &scatter);
-        drop(scatter);
         // Poses without a covariance still count; they are reported as uncertain.
         let total = match factor.zip(of_noise) {
             Some((factor, of_noise)) => {
                 let at_end = (&factor, curvature);
                 let posterior = posterior.as_ref();
-                let errors = EstimateErrors::find(solution, at_end, posterior, &of_noise, alpha)?;
+                let errors =
+                    EstimateErrors::find(solution, at_end, posterior, (&of_noise, &finest), alpha)?;
                 if let (Some(shared), Some(errors)) = (&mut shared, &errors) {
                     *shared += errors.draws.of_shared();
                 }
