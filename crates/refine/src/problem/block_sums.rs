@@ -118,6 +118,21 @@ impl BlockSums {
         }
     }
 
+    /// Product of the block's normal matrix and a step of all slots, slot by slot of the block.
+    pub fn product(&self, step: &[FrameStep]) -> Vec<FrameStep> {
+        let mut product = vec![FrameStep::zeros(); self.slots.len()];
+        for (column, slot) in self.slots.iter().enumerate() {
+            for row in 0..=column {
+                let block = &self.blocks[self.block_index(row, column)];
+                product[row] += block * step[*slot];
+                if row != column {
+                    product[column] += block.tr_mul(&step[self.slots[row]]);
+                }
+            }
+        }
+        product
+    }
+
     /// Adds the block to the cost, the normal equations with their border, and the frames'
     /// contributions.
     pub fn add_to(&self, pattern: &Pattern, sums: &mut Linearisation) {

@@ -148,9 +148,9 @@ impl PhotometricProblem<'_> {
         })
     }
 
-    /// Change of the gradient of the pixels' cost, slot by slot, from the unknowns `from` to the
-    /// unknowns `to`; `at`: the equations at the former. By one of `stride` tiles, if there is a
-    /// stride.
+    /// Change of the gradient of the pixels' cost, slot by slot, from the unknowns `from` by a step
+    /// δ of all slots to the unknowns `to`; `at`: the equations at the former, which predict the
+    /// change `H δ` of the pixels' part. By one of `stride` tiles, if there is a stride.
     ///
     /// # Errors
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
@@ -158,34 +158,34 @@ impl PhotometricProblem<'_> {
         &self,
         at: &Linearisation,
         (from, to): (&Unknowns, &Unknowns),
+        (step, predicted): (&[FrameStep], &[FrameStep]),
         stride: Option<usize>,
     ) -> Result<Vec<FrameStep>, ProblemError> {
-        let mut change = vec![FrameStep::zeros(); self.pattern.columns()];
-        let mut add = |gradient: &BlockGradient, factor: f64| {
-            for (slot, gradient) in gradient.slots.iter().zip(&gradient.slot_gradients) {
-                change[*slot] += gradient * (factor * self.information());
+        let information = self.information();
+        let add = |change: &mut [FrameStep], part: &BlockPart, sums: &[FrameStep], factor: f64| {
+            for (slot, sum) in part.sums.slots.iter().zip(sums) {
+                change[*slot] += sum * (factor * information);
             }
         };
-        match stride {
-            Some(stride) => {
-                for (unknowns, factor) in [(from, -1.0), (to, 1.0)] {
-                    self.visit_share(unknowns, TileShare::OneIn(stride), &mut |_, part| {
-                        add(&part.gradient(), factor * stride as f64);
-                    })?;
-                }
-            }
-            None => {
-                self.visit_share(to, TileShare::All, &mut |_, part| {
-                    add(&part.gradient(), 1.0)
-                })?;
-                let mut others = self.zero_linearisation();
-                self.add_others(from, &mut others);
-                let before = at.normal.gradient.iter().zip(&others.normal.gradient);
-                for (change, (all, others)) in change.iter_mut().zip(before) {
-                    *change -= all - others;
-                }
-            }
-        }
+        let Some(stride) = stride else {
+            let mut others = self.zero_linearisation();
+            self.add_others(from, &mut others);
+            let before = at.normal.gradient.iter().zip(&others.normal.gradient);
+            let mut change: Vec<FrameStep> = before.map(|(all, others)| others - all).collect();
+            self.visit_share(to, TileShare::All, &mut |_, part| {
+                add(&mut change, &part, &part.sums.gradient, 1.0);
+            })?;
+            return Ok(change);
+        };
+        let factor = stride as f64;
+        let mut change = predicted.to_vec();
+        self.visit_share(from, TileShare::OneIn(stride), &mut |_, part| {
+            add(&mut change, &part, &part.sums.gradient, -factor);
+            add(&mut change, &part, &part.sums.product(step), -factor);
+        })?;
+        self.visit_share(to, TileShare::OneIn(stride), &mut |_, part| {
+            add(&mut change, &part, &part.sums.gradient, factor);
+        })?;
         Ok(change)
     }
 

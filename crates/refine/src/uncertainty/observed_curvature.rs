@@ -44,18 +44,22 @@ pub fn observe_curvature(
     let from = &solution.linearised_at;
     let step = factor.step(scores);
     let to = problem.stepped(from, &step, &Kappa::zeros());
-    let stride = problem.mean_change_share(at);
-    let change = problem.pixel_gradient_change(at, (from, &to), stride)?;
-    let predicted = problem.pattern().product(&at.normal.blocks, &step);
+    let mut predicted = problem.pattern().product(&at.normal.blocks, &step);
     let (others, _) = problem.other_information(from);
     let of_others = problem.pattern().product(&others, &step);
+    drop(others);
+    for (predicted, of_others) in predicted.iter_mut().zip(&of_others) {
+        *predicted -= of_others;
+    }
+    let stride = problem.mean_change_share(at);
+    let change = problem.pixel_gradient_change(at, (from, &to), (&step, &predicted), stride)?;
     let along = |gradient: &[FrameStep]| -> f64 {
         let poses = step.iter().zip(gradient).take(from.frames.len());
         poses
             .map(|(step, g)| step.rows(0, POSE).dot(&g.rows(0, POSE)))
             .sum()
     };
-    let curvature = along(&change) / (along(&predicted) - along(&of_others));
+    let curvature = along(&change) / along(&predicted);
     // NaN, too, is none.
     let has_any = curvature > NO_CURVATURE;
     Ok(if has_any {
