@@ -53,7 +53,7 @@ impl Adjacency {
         &self.neighbours[self.starts[slot] as usize..self.starts[slot + 1] as usize]
     }
 
-    /// Where the neighbours of each slot start, and the neighbours of all.
+    /// Starts of the neighbours of each slot, and the neighbours of all.
     pub fn compressed(&self) -> (&[u32], &[u32]) {
         (&self.starts, &self.neighbours)
     }

@@ -1,7 +1,7 @@
 //! Orders of elimination of the slots of a pattern that leave their factor sparse.
 
 use crate::linear::adjacency::Adjacency;
-use crate::linear::sparse_cholesky::FactorError;
+use crate::linear::factor_error::FactorError;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMat;
 use faer::sparse::linalg::amd;

@@ -1,8 +1,8 @@
 //! Elimination of fronts, one after the other.
 
+use crate::linear::factor_error::FactorError;
 use crate::linear::fronts::{Front, Fronts};
 use crate::linear::normal_equations::NormalEquations;
-use crate::linear::sparse_cholesky::FactorError;
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
@@ -20,8 +20,8 @@ pub struct Matrix<'n> {
     pub diagonal: &'n [FrameStep],
 }
 
-/// What some fronts leave of their rows, until their parents take it: those of the front that is
-/// next are the last. Each has its front and the lower triangle of a matrix, column by column.
+/// Matrices that fronts leave of their rows, until their parents take them: those of the front that
+/// is next are the last. Each has its front and a lower triangle, column by column.
 pub type Remainders = Vec<(u32, Vec<f64>)>;
 
 /// Eliminates fronts in their order.
@@ -46,13 +46,13 @@ impl<'n> FrontElimination<'n> {
         }
     }
 
-    /// What the fronts before the next one have left.
+    /// Matrices that the fronts before the next one have left.
     pub fn left(&self) -> &Remainders {
         &self.left
     }
 
-    /// Eliminates the columns of the next front: `panel`, of as many values, is overwritten by those
-    /// of L, column by column. What is above the diagonal has no meaning.
+    /// Eliminates the columns of the next front: `panel`, of as many values, is overwritten by
+    /// those of L, column by column. What is above the diagonal has no meaning.
     ///
     /// # Errors
     /// [`FactorError::NotPositiveDefinite`].

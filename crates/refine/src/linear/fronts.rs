@@ -12,8 +12,8 @@
 use crate::linear::adjacency::Adjacency;
 use crate::linear::elimination_order::{minimum_degree_order, wavefront_order};
 use crate::linear::elimination_tree::{EliminationTree, for_each_column, positions};
+use crate::linear::factor_error::FactorError;
 use crate::linear::normal_equations::Pattern;
-use crate::linear::sparse_cholesky::FactorError;
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use std::ops::Range;
 

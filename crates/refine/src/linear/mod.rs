@@ -16,6 +16,7 @@ pub mod adjacency;
 pub mod bordered_system;
 pub mod elimination_order;
 pub mod elimination_tree;
+pub mod factor_error;
 pub mod front_elimination;
 pub mod fronts;
 pub mod normal_equations;

@@ -1,6 +1,7 @@
 //! Sparse Cholesky factorisation of the normal matrix: dense ones of its fronts
 //! ([`crate::linear::fronts`]), by faer.
 
+use crate::linear::factor_error::FactorError;
 use crate::linear::front_elimination::{FrontElimination, Matrix, Remainders};
 use crate::linear::fronts::{Front, Fronts};
 use crate::linear::normal_equations::{NormalEquations, Pattern};
@@ -16,17 +17,6 @@ use std::sync::Arc;
 
 /// Values of L that are in memory at a time, 32 MiB.
 const MAX_VALUES: usize = 1 << 22;
-
-/// Failures of the factorisation of the normal matrix.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum FactorError {
-    /// The matrix is not positive definite: neither pixels nor prior constrain some parameter.
-    #[error("the normal matrix is not positive definite")]
-    NotPositiveDefinite,
-    /// The symbolic analysis failed (the matrix is too large for memory).
-    #[error("the normal matrix could not be analysed: {0}")]
-    Structure(String),
-}
 
 /// The symbolic factorisation of a pattern: computed once, used for every step.
 ///

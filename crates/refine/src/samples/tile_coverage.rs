@@ -152,6 +152,11 @@ impl<'a> TileCoverage<'a> {
         self.excluded = marks;
     }
 
+    /// Gives back the memory of all observations; they are computed anew if they are needed.
+    pub fn release(&mut self) {
+        self.kept.fill(None);
+    }
+
     /// Computes the observations of a stretch.
     fn find(&self, stretch: usize) -> Visibility {
         let Stretch { rows, frames } = &self.stretches[stretch];

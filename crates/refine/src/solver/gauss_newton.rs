@@ -3,7 +3,7 @@
 //! This is the iteration itself, as plain code; [`crate::solver::argmin_glue`] hands it to
 //! argmin's executor, which counts iterations and shows progress.
 
-use crate::linear::sparse_cholesky::FactorError;
+use crate::linear::factor_error::FactorError;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameEstimate, FrameStep};
@@ -55,8 +55,8 @@ impl Solution<'_> {
         self.problem.tie_gauge(&self.linearised_at.frames, normal);
     }
 
-    /// The scores of patches of the wall at the unknowns. The gradients of its blocks are taken from
-    /// the linearisation.
+    /// The scores of patches of the wall at the unknowns. The gradients of its blocks are taken
+    /// from the linearisation.
     ///
     /// # Errors
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
@@ -66,6 +66,14 @@ impl Solution<'_> {
             .problem
             .take_block_gradients(&mut self.linearisation, from_to)?;
         Ok(self.problem.patch_scores(&gradients))
+    }
+
+    /// Gives back the memory of the normal matrix and of the observations, once the uncertainty is
+    /// known.
+    pub fn release_equations(&mut self) {
+        self.linearisation.normal.blocks = Vec::new();
+        self.linearisation.border = None;
+        self.problem.coverage.release();
     }
 
     /// Removes the shared parameters from the equations that are tested only.

@@ -95,6 +95,7 @@ pub fn run<'a>(
             state.dispersion = dispersion;
             plan_again(&plan, setup.options, state);
         } else {
+            solution.release_equations();
             estimation.solution = Some(LastSolve {
                 solution,
                 uncertainty,

@@ -43,9 +43,10 @@
 //! "Robust Statistics: The Approach Based on Influence Functions", 1986, 6.3 (ψ' in D); R. W. M.
 //! Wedderburn, "Quasi-likelihood functions", Biometrika 61(3), 1974 (one factor for all).
 
+use crate::linear::factor_error::FactorError;
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
-use crate::linear::sparse_cholesky::{Factor, FactorError, SymbolicFactorisation};
+use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::uncertainty::exposure_equations::{ExposurePattern, POSE};
 use crate::uncertainty::frame_sigma::FrameSigma;

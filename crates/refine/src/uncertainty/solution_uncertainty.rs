@@ -1,8 +1,9 @@
 //! Uncertainty of a solution: of its poses, and of the shared parameters that it does not observe.
 
 use crate::linear::bordered_system::SharedBlock;
+use crate::linear::factor_error::FactorError;
 use crate::linear::normal_equations::Pattern;
-use crate::linear::sparse_cholesky::{Factor, FactorError};
+use crate::linear::sparse_cholesky::Factor;
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
