@@ -182,7 +182,7 @@ fn bound_at(
     let at = problem.linearise_at(&problem.initial_unknowns())?;
     let factor = problem
         .symbolic()
-        .factorise(problem.pattern(), &at.normal, 0.0)
+        .factorise(&at.normal, 0.0)
         .map_err(|source| problem.factor_error(source))?;
     let information = ShapeInformation {
         schur: at.border.map(|border| border.eliminate(&factor, 0.0)),

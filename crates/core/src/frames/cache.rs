@@ -162,6 +162,14 @@ impl FrameCache {
         lock(&self.shelf).kept.clear();
     }
 
+    /// Drops the cached pyramids if there is no room for those of all frames: those of the end of a
+    /// survey are not needed at its beginning.
+    pub fn release_pyramids(&self) {
+        if self.room < self.frames() {
+            lock(&self.shelf).kept.clear();
+        }
+    }
+
     /// The pyramid of a frame in the light that is set; pixels without a value are NaN.
     ///
     /// # Errors

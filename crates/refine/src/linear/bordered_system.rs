@@ -57,15 +57,6 @@ impl SharedBorder {
         self.gradient *= factor;
     }
 
-    /// Adds `factor` times another border.
-    pub fn add(&mut self, other: &Self, factor: f64) {
-        for (block, other) in self.frames.iter_mut().zip(&other.frames) {
-            *block += other * factor;
-        }
-        self.own += other.own * factor;
-        self.gradient += other.gradient * factor;
-    }
-
     /// Adds the outer product of a partial gradient to the scatter: `frames` (slot by slot) and
     /// `shared` are its parts.
     pub fn add_scatter(
@@ -277,7 +268,7 @@ mod tests {
         }
         let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
         for lambda in [0.0, 0.1] {
-            let factor = symbolic.factorise(&pattern, &normal, lambda).unwrap();
+            let factor = symbolic.factorise(&normal, lambda).unwrap();
             let (step, shared) = border
                 .step(
                     &factor,
@@ -298,7 +289,7 @@ mod tests {
             assert_eq!(shared[4], 0.0);
         }
         // S⁻¹ is the shared block of the whole inverse, and H itself reduces to S.
-        let factor = symbolic.factorise(&pattern, &normal, 0.0).unwrap();
+        let factor = symbolic.factorise(&normal, 0.0).unwrap();
         let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
         let mirrored = |k: usize| {
             let mut block = normal.blocks[k];

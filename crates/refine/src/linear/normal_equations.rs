@@ -58,6 +58,22 @@ impl Pattern {
     }
 }
 
+impl Pattern {
+    /// Product of a symmetric matrix, with these upper `blocks`, and a vector.
+    pub fn product(&self, blocks: &[Block], vector: &[FrameStep]) -> Vec<FrameStep> {
+        let mut product = vec![FrameStep::zeros(); vector.len()];
+        for column in 0..self.columns() {
+            for (&row, block) in self.rows(column).iter().zip(&blocks[self.starts[column]..]) {
+                product[row] += block * vector[column];
+                if row != column {
+                    product[column] += block.tr_mul(&vector[row]);
+                }
+            }
+        }
+        product
+    }
+}
+
 /// `H δ = −g` of a cost `½ Σ r²`: the upper blocks of H and the gradient g.
 #[derive(Clone, Debug)]
 pub struct NormalEquations {

@@ -1,177 +1,140 @@
 //! Selected inversion: the blocks of `H⁻¹` on the sparsity pattern of the factor of H.
 //!
-//! Let `H = L D Lᵀ` with L unit lower triangular in 8 × 8 blocks, in an order of elimination that
-//! leaves it sparse ([`elimination_order`]). `Z = H⁻¹` obeys `Z = D⁻¹ L⁻¹ + (I − Lᵀ) Z`
-//! (Takahashi's equations). From the last column to the first, with R_j the rows of L's column j
-//! below the diagonal,
+//! With `H = L Lᵀ` and `Z = H⁻¹`, `Lᵀ Z = L⁻¹` ties what Z has in the columns c of a front to what
+//! it has in the rows r below them (Takahashi's equations):
 //!
-//! `Z_ij = −Σ_{k∈R_j} Z_ik L_kj`  (i ∈ R_j),   `Z_jj = D_j⁻¹ − Σ_{k∈R_j} L_kjᵀ Z_kj`,
+//! `Z_rc = −Z_rr Y`,   `Z_cc = (L_cc L_ccᵀ)⁻¹ − Yᵀ Z_rc`,   `Y = L_rc L_cc⁻¹`,
 //!
-//! where every `Z_ik` with i, k ∈ R_j lies on the pattern of the factor. Time and memory grow
-//! linearly with the length of the tunnel.
+//! where `Z_rr` is known from the front's parent, which has all rows as columns or rows. So Z goes
+//! from the last front to the first. Time and memory grow linearly with the length of the tunnel.
 //!
 //! Source: K. Takahashi, J. Fagan, M. Chin, "Formation of a sparse bus impedance matrix and its
 //! application to short circuit study", 1973.
 
-use crate::linear::elimination_order::elimination_order;
-use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
-use crate::linear::sparse_cholesky::FactorError;
+use crate::linear::fronts::{Front, Fronts};
+use crate::linear::normal_equations::Block;
+use crate::linear::sparse_cholesky::{Factor, Panel};
+use crate::parameters::frame_estimate::FRAME_PARAMETERS;
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::{
+    solve_lower_triangular_in_place, solve_upper_triangular_in_place,
+};
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+use std::sync::Arc;
 
 /// Blocks of `H⁻¹` on the pattern of the factor.
 pub struct SelectedInverse {
-    /// Position of every slot in the order of elimination; all else is in this order.
-    position: Vec<usize>,
-    /// Rows of every column of L below the diagonal, ascending.
-    rows: Vec<Vec<usize>>,
-    /// `Z_ij` of these rows, in their order.
-    below: Vec<Vec<Block>>,
-    /// `Z_jj`.
-    diagonal: Vec<Block>,
+    fronts: Arc<Fronts>,
+    /// Columns of `H⁻¹`, front by front, as those of the factor.
+    values: Vec<f64>,
 }
 
 impl SelectedInverse {
-    /// Factorises the normal matrix and computes the blocks of its inverse.
-    ///
-    /// # Errors
-    /// [`FactorError::NotPositiveDefinite`].
-    pub fn new(pattern: &Pattern, normal: &NormalEquations) -> Result<Self, FactorError> {
-        let count = pattern.columns();
-        let place_of = elimination_order(pattern)?;
-        let rows = factor_rows(pattern, &place_of);
-        let position =
-            |rows: &[Vec<usize>], column: usize, row: usize| rows[column].binary_search(&row).ok();
-        // The lower triangle: the transposes of the pattern's upper blocks.
-        let mut factor: Vec<Vec<Block>> =
-            rows.iter().map(|r| vec![Block::zeros(); r.len()]).collect();
-        let mut diagonal = vec![Block::zeros(); count];
-        for column in 0..count {
-            for &row in pattern.rows(column) {
-                let Some(at) = pattern.block_index(row, column) else {
-                    continue;
-                };
-                let block = &normal.blocks[at];
-                let (i, j) = (place_of[row], place_of[column]);
-                if row == column {
-                    diagonal[j] = block.symmetric_upper();
-                } else if let Some(at) = position(&rows, i.min(j), i.max(j)) {
-                    factor[i.min(j)][at] = if i < j { block.transpose() } else { *block };
+    /// Computes the blocks of the inverse of a factorised matrix.
+    pub fn new(factor: &Factor) -> Self {
+        let fronts = factor.fronts();
+        let mut values = vec![0.0; fronts.values()];
+        let mut children = vec![0; fronts.all.len()];
+        for parent in fronts.all.iter().filter_map(|front| front.parent) {
+            children[parent as usize] += 1;
+        }
+        // Z of columns and rows of fronts whose children have not all taken theirs; the last is
+        // the parent of the front that is next.
+        let mut known: Vec<Mat<f64>> = Vec::new();
+        factor.for_each_front_reversed(|front, panel| {
+            let mut z = Mat::zeros(front.height(), front.height());
+            if let (Some(parent), Some(of_parent)) = (front.parent, known.last()) {
+                let parent = parent as usize;
+                copy_rows(front, &fronts.all[parent], of_parent.as_ref(), z.as_mut());
+                children[parent] -= 1;
+                if children[parent] == 0 {
+                    known.pop();
                 }
             }
-        }
-        // Right-looking: each finished column j updates the later columns that it reaches.
-        let mut inverse_pivots = Vec::with_capacity(count);
-        for j in 0..count {
-            let pivot = diagonal[j]
-                .cholesky()
-                .ok_or(FactorError::NotPositiveDefinite)?
-                .inverse();
-            let raw = std::mem::take(&mut factor[j]);
-            let scaled: Vec<Block> = raw.iter().map(|block| block * pivot).collect();
-            for (b, &column) in rows[j].iter().enumerate() {
-                let transposed = raw[b].transpose();
-                diagonal[column] -= scaled[b] * transposed;
-                for (a, &row) in rows[j].iter().enumerate().skip(b + 1) {
-                    if let Some(at) = position(&rows, column, row) {
-                        factor[column][at] -= scaled[a] * transposed;
-                    }
-                }
+            add_columns(front, panel, z.as_mut());
+            let panel = &mut values[front.start..][..front.values()];
+            MatMut::from_column_major_slice_mut(panel, front.height(), front.width())
+                .copy_from(z.as_ref().subcols(0, front.width()));
+            if children[fronts.index_of(front)] > 0 {
+                known.push(z);
             }
-            factor[j] = scaled;
-            inverse_pivots.push(pivot);
+        });
+        Self {
+            fronts: fronts.clone(),
+            values,
         }
-        let mut inverse = Self {
-            position: place_of,
-            below: rows.iter().map(|_| Vec::new()).collect(),
-            diagonal: inverse_pivots,
-            rows,
-        };
-        for j in (0..count).rev() {
-            // Each column of L gives its memory to that of the inverse.
-            let factor = std::mem::take(&mut factor[j]);
-            let column: Vec<Block> = inverse.rows[j]
-                .iter()
-                .map(|&i| {
-                    let sum = inverse.rows[j].iter().zip(&factor);
-                    sum.map(|(&k, l)| inverse.block_at(i, k).unwrap_or_default() * l)
-                        .fold(Block::zeros(), |sum, term| sum - term)
-                })
-                .collect();
-            for (l, z) in factor.iter().zip(&column) {
-                inverse.diagonal[j] -= l.transpose() * z;
-            }
-            inverse.below[j] = column;
-        }
-        Ok(inverse)
     }
 
     /// Block (row, column) of `H⁻¹`, if it lies on the pattern of the factor.
     pub fn block(&self, row: usize, column: usize) -> Option<Block> {
-        self.block_at(self.position[row], self.position[column])
-    }
-
-    /// The block at positions in the order of elimination.
-    fn block_at(&self, row: usize, column: usize) -> Option<Block> {
-        if row == column {
-            return Some(self.diagonal[row]);
-        }
-        let (late, early) = (row.max(column), row.min(column));
-        let block = self.below[early].get(self.rows[early].binary_search(&late).ok()?)?;
-        Some(if row > column {
-            *block
-        } else {
-            block.transpose()
-        })
+        let (front, r, c, is_lower) = self.fronts.find(row, column)?;
+        let front = &self.fronts.all[front];
+        let height = front.height();
+        let first = front.start + c * FRAME_PARAMETERS * height + r * FRAME_PARAMETERS;
+        let block = Block::from_fn(|r, c| self.values[first + c * height + r]);
+        Some(if is_lower { block } else { block.transpose() })
     }
 }
 
-/// Mirrors the upper triangle of a block below the diagonal; only the upper one is summed up.
-trait SymmetricUpper {
-    fn symmetric_upper(&self) -> Self;
-}
-
-impl SymmetricUpper for Block {
-    fn symmetric_upper(&self) -> Self {
-        let mut block = *self;
-        block.fill_lower_triangle_with_upper_triangle();
-        block
-    }
-}
-
-/// Symbolic factorisation: the rows of the factor's columns below the diagonal, in the order of
-/// elimination. A column has the rows of the matrix and those of its children in the elimination
-/// tree.
-fn factor_rows(pattern: &Pattern, place_of: &[usize]) -> Vec<Vec<usize>> {
-    let count = pattern.columns();
-    let mut rows: Vec<Vec<usize>> = vec![Vec::new(); count];
-    for column in 0..count {
-        for &row in pattern.rows(column) {
-            if row < column {
-                let (i, j) = (place_of[row], place_of[column]);
-                rows[i.min(j)].push(i.max(j));
-            }
+/// Copies `Z_rr` of the rows of a front from the Z of its parent.
+fn copy_rows(front: &Front, parent: &Front, of_parent: MatRef<f64>, mut z: MatMut<f64>) {
+    let places: Vec<usize> = front.places_in(parent);
+    let size = FRAME_PARAMETERS;
+    for (k, &column) in places.iter().enumerate() {
+        for (r, &row) in places.iter().enumerate() {
+            z.rb_mut()
+                .submatrix_mut(
+                    front.width() + r * size,
+                    front.width() + k * size,
+                    size,
+                    size,
+                )
+                .copy_from(of_parent.submatrix(row, column, size, size));
         }
     }
-    for j in 0..count {
-        rows[j].sort_unstable();
-        rows[j].dedup();
-        if let Some((&parent, rest)) = rows[j].split_first() {
-            let rest = rest.to_vec();
-            rows[parent].extend(rest);
-        }
-    }
-    rows
+}
+
+/// Completes Z of a front, of which that of its rows is known.
+fn add_columns(front: &Front, (own, below): Panel, z: MatMut<f64>) {
+    let mut y = below.to_owned();
+    solve_upper_triangular_in_place(own.transpose(), y.as_mut().transpose_mut(), Par::Seq);
+    let (mut of_columns, mut above, mut across, of_rows) =
+        z.split_at_mut(front.width(), front.width());
+    matmul(
+        across.rb_mut(),
+        Accum::Replace,
+        of_rows.rb(),
+        y.as_ref(),
+        -1.0,
+        Par::Seq,
+    );
+    above.copy_from(across.rb().transpose());
+    of_columns.fill(0.0);
+    of_columns.rb_mut().diagonal_mut().fill(1.0);
+    solve_lower_triangular_in_place(own, of_columns.rb_mut(), Par::Seq);
+    solve_upper_triangular_in_place(own.transpose(), of_columns.rb_mut(), Par::Seq);
+    matmul(
+        of_columns,
+        Accum::Add,
+        y.transpose(),
+        across.rb(),
+        -1.0,
+        Par::Seq,
+    );
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linear::sparse_cholesky::SymbolicFactorisation;
     use crate::linear::test_dense::random_equations;
-    use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 
     #[test]
     fn blocks_agree_with_the_dense_inverse() {
-        let (pattern, normal, dense) = random_equations(11, 7, 12.0);
-        let inverse = SelectedInverse::new(&pattern, &normal).unwrap();
+        let (pattern, normal, dense) = random_equations(60, 7, 12.0);
+        let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
+        let inverse = SelectedInverse::new(&symbolic.factorise(&normal, 0.0).unwrap());
         let expected = dense.try_inverse().unwrap();
         for column in 0..pattern.columns() {
             for &row in pattern.rows(column) {

@@ -1,6 +1,6 @@
 //! Errors of the photometric problem and its solver.
 
-use crate::linear::sparse_cholesky::FactorError;
+use crate::linear::factor_error::FactorError;
 use tunnelstitch_core::frames::FrameError;
 use tunnelstitch_core::persist::checkpoint::CheckpointError;
 use tunnelstitch_geometry::surface::SurfaceError;

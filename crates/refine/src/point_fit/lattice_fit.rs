@@ -234,9 +234,7 @@ impl<'e> System<'e> {
 
     /// The factor of the normal matrix; None if it is singular.
     fn factorise(&self) -> Option<crate::linear::sparse_cholesky::Factor<'_>> {
-        self.symbolic
-            .factorise(&self.pattern, &self.normal, 0.0)
-            .ok()
+        self.symbolic.factorise(&self.normal, 0.0).ok()
     }
 
     /// The equations for learning the strengths.

@@ -118,19 +118,46 @@ impl BlockSums {
         }
     }
 
-    /// Adds `factor` times the block to the cost, the normal equations with their border, and the
-    /// frames' contributions.
-    pub fn add_to(&self, pattern: &Pattern, factor: f64, sums: &mut Linearisation) {
+    /// Product of the block's normal matrix and a step of all slots, slot by slot of the block.
+    pub fn product(&self, step: &[FrameStep]) -> Vec<FrameStep> {
+        let mut product = vec![FrameStep::zeros(); self.slots.len()];
+        for (column, slot) in self.slots.iter().enumerate() {
+            for row in 0..=column {
+                let block = &self.blocks[self.block_index(row, column)];
+                product[row] += block * step[*slot];
+                if row != column {
+                    product[column] += block.tr_mul(&step[self.slots[row]]);
+                }
+            }
+        }
+        product
+    }
+
+    /// Adds the block to the cost, the normal equations with their border, and the frames'
+    /// contributions.
+    pub fn add_to(&self, pattern: &Pattern, sums: &mut Linearisation) {
+        self.add_equations(pattern, 1.0, sums);
+        self.add_contributions(1.0, sums);
+        for (slot, sum) in self.slots.iter().zip(&self.contributions) {
+            sums.frames[*slot].samples += sum.samples;
+        }
+    }
+
+    /// Adds `factor` times the block to the frames' contributions, but for the numbers of samples.
+    pub fn add_contributions(&self, factor: f64, sums: &mut Linearisation) {
+        for (slot, sum) in self.slots.iter().zip(&self.contributions) {
+            let frame = &mut sums.frames[*slot];
+            frame.pixels += sum.pixels * factor;
+            frame.inliers += sum.inliers * factor;
+            frame.square += sum.square * factor;
+        }
+    }
+
+    /// Adds `factor` times the block to the cost and the normal equations with their border.
+    pub fn add_equations(&self, pattern: &Pattern, factor: f64, sums: &mut Linearisation) {
         sums.cost += self.cost * factor;
         for (column, slot) in self.slots.iter().enumerate() {
             sums.normal.gradient[*slot] += self.gradient[column] * factor;
-            if let Some(sum) = self.contributions.get(column) {
-                let frame = &mut sums.frames[*slot];
-                frame.samples += sum.samples;
-                frame.pixels += sum.pixels * factor;
-                frame.inliers += sum.inliers * factor;
-                frame.square += sum.square * factor;
-            }
             for row in 0..=column {
                 let block = self.blocks[self.block_index(row, column)] * factor;
                 sums.normal

@@ -51,24 +51,25 @@ impl BlockGradient {
 }
 
 impl Linearisation {
-    /// Adds `factor` times the cost, the equations and the frames' contributions of `change`. The
-    /// numbers of samples and the gradients of blocks stay.
-    pub fn add(&mut self, change: &Self, factor: f64) {
-        self.cost += change.cost * factor;
-        let (own, other) = (&mut self.normal, &change.normal);
-        for (block, change) in own.blocks.iter_mut().zip(&other.blocks) {
-            *block += change * factor;
+    /// Changes the sign of the cost, the equations and the frames' contributions, but for the
+    /// numbers of samples.
+    pub fn negate(&mut self) {
+        self.cost = -self.cost;
+        self.normal
+            .blocks
+            .iter_mut()
+            .for_each(|block| *block = -*block);
+        self.normal
+            .gradient
+            .iter_mut()
+            .for_each(|gradient| *gradient = -*gradient);
+        for frame in &mut self.frames {
+            frame.pixels = -frame.pixels;
+            frame.inliers = -frame.inliers;
+            frame.square = -frame.square;
         }
-        for (gradient, change) in own.gradient.iter_mut().zip(&other.gradient) {
-            *gradient += change * factor;
-        }
-        for (frame, change) in self.frames.iter_mut().zip(&change.frames) {
-            frame.pixels += change.pixels * factor;
-            frame.inliers += change.inliers * factor;
-            frame.square += change.square * factor;
-        }
-        if let Some((border, change)) = self.border.as_mut().zip(change.border.as_ref()) {
-            border.add(change, factor);
+        if let Some(border) = &mut self.border {
+            border.scale(-1.0);
         }
     }
 
@@ -79,20 +80,8 @@ impl Linearisation {
         pattern: &Pattern,
         (step, shared): (&[FrameStep], &Kappa),
     ) -> (f64, Vec<FrameStep>, Kappa) {
-        let mut product = vec![FrameStep::zeros(); step.len()];
+        let mut product = pattern.product(&self.normal.blocks, step);
         let mut shared_product = Kappa::zeros();
-        for column in 0..pattern.columns() {
-            for &row in pattern.rows(column) {
-                let Some(index) = pattern.block_index(row, column) else {
-                    continue;
-                };
-                let block = &self.normal.blocks[index];
-                product[row] += block * step[column];
-                if row != column {
-                    product[column] += block.tr_mul(&step[row]);
-                }
-            }
-        }
         let gradient = &self.normal.gradient;
         let mut slope: f64 = gradient.iter().zip(step).map(|(g, step)| g.dot(step)).sum();
         if let Some(border) = &self.border {

@@ -100,7 +100,7 @@ impl PhotometricProblem<'_> {
     /// Adds a block of the wall, with its row and column, to the pixels' part, in units of grey
     /// levels².
     pub(super) fn add_block(&self, place: (i64, i64), block: &BlockSums, sums: &mut Linearisation) {
-        block.add_to(&self.pattern, 1.0, sums);
+        block.add_to(&self.pattern, sums);
         sums.block_gradients.push(block.block_gradient(place));
     }
 
@@ -456,10 +456,7 @@ mod tests {
         let start = problem.linearise(&estimates).unwrap().cost;
         for _ in 0..6 {
             let at = problem.linearise(&estimates).unwrap();
-            let factor = problem
-                .symbolic()
-                .factorise(problem.pattern(), &at.normal, 0.0)
-                .unwrap();
+            let factor = problem.symbolic().factorise(&at.normal, 0.0).unwrap();
             let step = factor.step(&at.normal.gradient);
             estimates = estimates
                 .iter()

@@ -27,6 +27,7 @@
 
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::SHARED_PARAMETERS;
+use crate::parameters::frame_estimate::FrameStep;
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::block_sums::BlockSums;
 use crate::problem::linearisation::{BlockGradient, Linearisation};
@@ -101,30 +102,19 @@ impl PhotometricProblem<'_> {
         if calibration.cameras(&to.kappa).is_none() {
             return self.linearise_at(to);
         }
-        let (mut before, mut after) = (self.zero_linearisation(), self.zero_linearisation());
-        let mut next = at.clone();
         let factor = stride as f64;
-        self.visit_share(from, stride, &mut |k, part| {
-            part.sums.add_to(&self.pattern, factor, &mut before);
-            next.block_gradients[k].add(&part.gradient(), -factor);
-        })?;
-        self.visit_share(to, stride, &mut |k, part| {
-            part.sums.add_to(&self.pattern, factor, &mut after);
-            next.block_gradients[k].add(&part.gradient(), factor);
-        })?;
-        self.scale_by_noise(&mut before);
-        self.scale_by_noise(&mut after);
-        let (of_before, of_after) = (self.others(from), self.others(to));
         // The pixels' part of the equations that the share does not have.
-        let mut rest = at.clone();
+        let mut next = at.clone();
         if let Some((index, constraint)) = &at.constraint {
-            rest.normal.blocks[*index] -= constraint;
+            next.normal.blocks[*index] -= constraint;
         }
-        rest.add(&of_before, -1.0);
-        rest.add(&before, -1.0);
-        self.fix_shared(&mut rest);
+        next.negate();
+        self.add_others(from, &mut next);
+        next.negate();
+        self.add_share(from, stride, -factor, &mut next)?;
+        self.fix_shared(&mut next);
         let (step, shared) = from.local(to);
-        let (cost, gradient, shared_gradient) = rest.predict(&self.pattern, (&step, &shared));
+        let (cost, gradient, shared_gradient) = next.predict(&self.pattern, (&step, &shared));
         next.cost += cost;
         for (sum, change) in next.normal.gradient.iter_mut().zip(&gradient) {
             *sum += change;
@@ -132,23 +122,71 @@ impl PhotometricProblem<'_> {
         if let Some(border) = &mut next.border {
             border.gradient += shared_gradient;
         }
-        for (sums, factor) in [
-            (after, 1.0),
-            (before, -1.0),
-            (of_after, 1.0),
-            (of_before, -1.0),
-        ] {
-            next.add(&sums, factor);
+        self.add_share(to, stride, factor, &mut next)?;
+        self.add_others(to, &mut next);
+        if let Some((index, constraint)) = &at.constraint {
+            next.normal.blocks[*index] += constraint;
         }
         self.fix_shared(&mut next);
         Ok(next)
     }
 
-    /// All terms but those of the pixels.
-    fn others(&self, unknowns: &Unknowns) -> Linearisation {
-        let mut others = self.zero_linearisation();
-        self.add_others(unknowns, &mut others);
-        others
+    /// Adds `factor` times the pixels' part of one of `stride` tiles, but for the numbers of
+    /// samples.
+    fn add_share(
+        &self,
+        unknowns: &Unknowns,
+        stride: usize,
+        factor: f64,
+        sums: &mut Linearisation,
+    ) -> Result<(), ProblemError> {
+        let of_equations = factor * self.information();
+        self.visit_share(unknowns, TileShare::OneIn(stride), &mut |k, part| {
+            part.sums.add_equations(&self.pattern, of_equations, sums);
+            part.sums.add_contributions(factor, sums);
+            sums.block_gradients[k].add(&part.gradient(), factor);
+        })
+    }
+
+    /// Change of the gradient of the pixels' cost, slot by slot, from the unknowns `from` by a step
+    /// δ of all slots to the unknowns `to`; `at`: the equations at the former, which predict the
+    /// change `H δ` of the pixels' part. By one of `stride` tiles, if there is a stride.
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
+    pub fn pixel_gradient_change(
+        &self,
+        at: &Linearisation,
+        (from, to): (&Unknowns, &Unknowns),
+        (step, predicted): (&[FrameStep], &[FrameStep]),
+        stride: Option<usize>,
+    ) -> Result<Vec<FrameStep>, ProblemError> {
+        let information = self.information();
+        let add = |change: &mut [FrameStep], part: &BlockPart, sums: &[FrameStep], factor: f64| {
+            for (slot, sum) in part.sums.slots.iter().zip(sums) {
+                change[*slot] += sum * (factor * information);
+            }
+        };
+        let Some(stride) = stride else {
+            let mut others = self.zero_linearisation();
+            self.add_others(from, &mut others);
+            let before = at.normal.gradient.iter().zip(&others.normal.gradient);
+            let mut change: Vec<FrameStep> = before.map(|(all, others)| others - all).collect();
+            self.visit_share(to, TileShare::All, &mut |_, part| {
+                add(&mut change, &part, &part.sums.gradient, 1.0);
+            })?;
+            return Ok(change);
+        };
+        let factor = stride as f64;
+        let mut change = predicted.to_vec();
+        self.visit_share(from, TileShare::OneIn(stride), &mut |_, part| {
+            add(&mut change, &part, &part.sums.gradient, -factor);
+            add(&mut change, &part, &part.sums.product(step), -factor);
+        })?;
+        self.visit_share(to, TileShare::OneIn(stride), &mut |_, part| {
+            add(&mut change, &part, &part.sums.gradient, factor);
+        })?;
+        Ok(change)
     }
 
     /// Removes the shared parameters from the equations that are not estimated.
@@ -161,42 +199,42 @@ impl PhotometricProblem<'_> {
     }
 
     /// The gradients of all blocks of the wall at the unknowns `to`; `at`: the equations at the
-    /// unknowns `from`.
+    /// unknowns `from`, whose own gradients of blocks are taken.
     ///
     /// # Errors
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
-    pub fn block_gradients(
+    pub fn take_block_gradients(
         &self,
-        at: &Linearisation,
+        at: &mut Linearisation,
         (from, to): (&Unknowns, &Unknowns),
     ) -> Result<Vec<BlockGradient>, ProblemError> {
+        let mut gradients = std::mem::take(&mut at.block_gradients);
         let (step, shared) = from.local(to);
         let moved = self.wall_step_px(&from.frames, &step, &shared);
         let step_px = moved.into_iter().fold(0.0, f64::max);
         let Some(stride) = self.change_share(at, step_px) else {
+            drop(gradients);
             return Ok(self.linearise_at(to)?.block_gradients);
         };
-        let mut gradients = at.block_gradients.clone();
         for (unknowns, factor) in [(from, -1.0), (to, 1.0)] {
-            self.visit_share(unknowns, stride, &mut |k, part| {
+            self.visit_share(unknowns, TileShare::OneIn(stride), &mut |k, part| {
                 gradients[k].add(&part.gradient(), factor * stride as f64);
             })?;
         }
         Ok(gradients)
     }
 
-    /// Visits one of `stride` tiles of every block, with the index of the block.
+    /// Visits a share of the tiles of every block, with the index of the block.
     fn visit_share(
         &self,
         unknowns: &Unknowns,
-        stride: usize,
+        share: TileShare,
         visit: &mut dyn FnMut(usize, BlockPart),
     ) -> Result<(), ProblemError> {
         let Some(cameras) = self.context.calibration.cameras(&unknowns.kappa) else {
             return Ok(());
         };
         let mut k = 0;
-        let share = TileShare::OneIn(stride);
         self.visit_blocks(unknowns, &cameras, share, &mut |place, sums| {
             visit(k, BlockPart { place, sums });
             k += 1;

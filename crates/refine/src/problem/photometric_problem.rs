@@ -1,8 +1,9 @@
 //! The photometric problem over a window of frames at one pyramid level.
 
 use crate::joint::joint_block::WallModel;
+use crate::linear::factor_error::FactorError;
 use crate::linear::normal_equations::Pattern;
-use crate::linear::sparse_cholesky::{FactorError, SymbolicFactorisation};
+use crate::linear::sparse_cholesky::SymbolicFactorisation;
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::{BEND_INDEX, Kappa, SHARED_PARAMETERS};
@@ -59,7 +60,7 @@ pub struct PhotometricProblem<'a> {
     /// Motion of each participant's camera during a readout of one second.
     pub(super) rates: Vec<Sweep>,
     /// Observations of the samples.
-    pub(super) coverage: TileCoverage<'a>,
+    pub(crate) coverage: TileCoverage<'a>,
     /// Tiles that the outlier mask has excluded frames from.
     pub(super) excluded_tiles: ExcludedTiles,
     /// The first active frame that is compared, counted from the first active one; the gauge is

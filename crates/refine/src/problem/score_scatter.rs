@@ -2,8 +2,11 @@
 
 use crate::linear::bordered_system::SharedBorder;
 use crate::linear::normal_equations::{Block, Pattern};
+use crate::parameters::frame_estimate::FrameStep;
 use crate::problem::linearisation::{BlockGradient, Linearisation};
 use crate::problem::photometric_problem::PhotometricProblem;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// Scatter of the scores: `Σ_b g_b g_bᵀ` over the blocks b of the wall, with `g_b` the gradient of
 /// the block's cost.
@@ -15,6 +18,8 @@ pub struct ScoreScatter {
     pub blocks: Vec<Block>,
     /// The border, if the shared parameters are estimated.
     pub border: Option<SharedBorder>,
+    /// Scores of slots with this scatter: their sum with random signs.
+    pub signed: Vec<FrameStep>,
 }
 
 impl ScoreScatter {
@@ -44,6 +49,7 @@ impl PhotometricProblem<'_> {
             border: self
                 .estimates_shared
                 .then(|| SharedBorder::zeros(pattern.columns())),
+            signed: self.signed_scores(at),
         };
         for block in &at.block_gradients {
             scatter.add(pattern, block);
@@ -54,5 +60,19 @@ impl PhotometricProblem<'_> {
             border.scale(square);
         }
         scatter
+    }
+
+    /// Scores of slots with this scatter, `at` an estimate: their sum with random signs.
+    pub fn signed_scores(&self, at: &Linearisation) -> Vec<FrameStep> {
+        let mut scores = vec![FrameStep::zeros(); self.pattern().columns()];
+        let mut random = ChaCha8Rng::seed_from_u64(0);
+        for block in &at.block_gradients {
+            let sign = if random.random() { 1.0 } else { -1.0 };
+            let scale = sign * self.information();
+            for (slot, gradient) in block.slots.iter().zip(&block.slot_gradients) {
+                scores[*slot] += gradient * scale;
+            }
+        }
+        scores
     }
 }

@@ -22,7 +22,7 @@ const MAX_STRETCH_OBSERVATIONS: f64 = 1e6;
 const MAX_STRETCH_FRAMES: f64 = 256.0;
 /// Observations whose visibility is kept from one linearisation to the next; further ones are
 /// computed anew each time. Bounds the memory on long surveys.
-const MAX_KEPT_OBSERVATIONS: usize = 16_000_000;
+const MAX_KEPT_OBSERVATIONS: usize = 6_000_000;
 
 /// A stretch of the wall that is processed at once.
 #[derive(Clone, Debug)]
@@ -150,6 +150,11 @@ impl<'a> TileCoverage<'a> {
             }
         }
         self.excluded = marks;
+    }
+
+    /// Gives back the memory of all observations; they are computed anew if they are needed.
+    pub fn release(&mut self) {
+        self.kept.fill(None);
     }
 
     /// Computes the observations of a stretch.

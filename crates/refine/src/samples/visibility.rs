@@ -6,7 +6,6 @@ use crate::samples::tile_candidates::{TileNumbering, TileRange};
 use crate::samples::tile_projection::project_tile;
 use crate::thresholds::visibility::MIN_RELATIVE_SHARPNESS;
 use crate::tiles::grid::{TileId, WallGrid};
-use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::{CameraLight, Masks, PyramidMask};
@@ -70,8 +69,8 @@ pub struct Visibility {
     pub observers: Vec<Observer>,
     /// Ranges of the tiles of one block, the units of parallel work.
     pub blocks: Vec<Range<usize>>,
-    /// Tiles and frames that [`Visibility::exclude`] has removed.
-    excluded: HashSet<(TileId, u32)>,
+    /// Tiles and frames that [`Visibility::exclude`] has removed, in the order of the tiles.
+    excluded: Vec<(TileId, u32)>,
 }
 
 impl Visibility {
@@ -153,8 +152,11 @@ impl Visibility {
         });
     }
 
-    /// Finds the ranges of tiles of one block.
+    /// Finds the ranges of tiles of one block, and gives back memory that is not used.
     fn find_blocks(&mut self) {
+        self.excluded.shrink_to_fit();
+        self.tiles.shrink_to_fit();
+        self.observers.shrink_to_fit();
         let mut start = 0;
         for tiles in self.tiles.chunk_by(|a, b| a.id.block() == b.id.block()) {
             self.blocks.push(start..start + tiles.len());
@@ -211,7 +213,12 @@ impl Visibility {
 
     /// True if a frame is excluded from a tile.
     pub fn is_excluded(&self, tile: TileId, frame: usize) -> bool {
-        self.excluded.contains(&(tile, frame as u32))
+        let key = |(tile, frame): (TileId, u32)| (tile.block(), tile.row, tile.column, frame);
+        let searched = key((tile, frame as u32));
+        let found = self
+            .excluded
+            .binary_search_by_key(&searched, |excluded| key(*excluded));
+        found.is_ok()
     }
 
     /// Observers of a tile.

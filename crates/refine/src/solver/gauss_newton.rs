@@ -3,12 +3,13 @@
 //! This is the iteration itself, as plain code; [`crate::solver::argmin_glue`] hands it to
 //! argmin's executor, which counts iterations and shows progress.
 
-use crate::linear::sparse_cholesky::FactorError;
+use crate::linear::factor_error::FactorError;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameEstimate, FrameStep};
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::linearisation::Linearisation;
+use crate::problem::patch_scores::PatchScores;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::solve_record::{SolveRecord, StepRecord};
 use crate::solver::stopping::{StopReason, Stopping};
@@ -52,6 +53,27 @@ impl Solution<'_> {
     pub fn tie_gauge(&mut self) {
         let normal = &mut self.linearisation.normal;
         self.problem.tie_gauge(&self.linearised_at.frames, normal);
+    }
+
+    /// The scores of patches of the wall at the unknowns. The gradients of its blocks are taken
+    /// from the linearisation.
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
+    pub fn take_patch_scores(&mut self) -> Result<PatchScores, ProblemError> {
+        let from_to = (&self.linearised_at, &self.unknowns);
+        let gradients = self
+            .problem
+            .take_block_gradients(&mut self.linearisation, from_to)?;
+        Ok(self.problem.patch_scores(&gradients))
+    }
+
+    /// Gives back the memory of the normal matrix and of the observations, once the uncertainty is
+    /// known.
+    pub fn release_equations(&mut self) {
+        self.linearisation.normal.blocks = Vec::new();
+        self.linearisation.border = None;
+        self.problem.coverage.release();
     }
 
     /// Removes the shared parameters from the equations that are tested only.
@@ -337,9 +359,7 @@ impl DampedGaussNewton {
         current: &Linearisation,
     ) -> Result<Option<(Vec<FrameStep>, Kappa)>, ProblemError> {
         let normal = &current.normal;
-        let factor = problem
-            .symbolic()
-            .factorise(problem.pattern(), normal, self.lambda);
+        let factor = problem.symbolic().factorise(normal, self.lambda);
         let is_last_resort = self.lambda >= 1.0;
         let factor = match factor {
             Ok(factor) => factor,

@@ -211,7 +211,7 @@ impl<'s> ShapeEquations<'s> {
             changes[slots].fill(sigma_m.powi(-2) - scale.sigma_m.powi(-2));
         }
         let diagonal = |slot: usize, own: f64| own + changes[slot];
-        let factor = (self.symbolic).factorise_with(self.pattern, self.normal, diagonal);
+        let factor = (self.symbolic).factorise_with(self.normal, diagonal);
         factor.ok()
     }
 

@@ -65,7 +65,7 @@ pub fn run<'a>(
     }
     solution.remove_tested();
     solution.tie_gauge();
-    let uncertainty = uncertainty_of(setup, &context, state, &solution)?;
+    let uncertainty = uncertainty_of(setup, &context, state, &mut solution)?;
     let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
     let mut kappa = state.kappa;
     for parameter in &unobservable {
@@ -105,6 +105,7 @@ pub fn run<'a>(
             state.dispersion = dispersion;
             plan_again(&plan, setup.options, state);
         } else {
+            solution.release_equations();
             estimation.solution = Some(LastSolve {
                 solution,
                 uncertainty,
@@ -182,17 +183,15 @@ fn problem_at<'a>(
 fn observe_curvature_at_start(
     problem: &PhotometricProblem,
 ) -> Result<ObservedCurvature, ProblemError> {
-    let pattern = problem.pattern();
     let start = problem.initial_linearisation().and_then(|at| {
-        let factor = problem.symbolic().factorise(pattern, &at.normal, 0.0);
+        let factor = problem.symbolic().factorise(&at.normal, 0.0);
         Some((at, factor.ok()?))
     });
-    match start {
-        Some((at, factor)) => {
-            observe_curvature(problem, (at, &problem.initial_unknowns()), &factor)
-        }
-        None => Ok(ObservedCurvature::AS_PREDICTED),
-    }
+    let Some((at, factor)) = start else {
+        return Ok(ObservedCurvature::AS_PREDICTED);
+    };
+    let at_start = (at, &problem.initial_unknowns());
+    observe_curvature(problem, at_start, &factor, &problem.signed_scores(at))
 }
 
 /// True if finer pixels than those of a solve tell more at its end: at its beginning frames, lens or
@@ -278,7 +277,7 @@ fn uncertainty_of(
     setup: &Setup,
     context: &EstimationContext,
     state: &PipelineState,
-    solution: &Solution,
+    solution: &mut Solution,
 ) -> Result<Option<SolutionUncertainty>, ProblemError> {
     let calibration = setup.calibration_at(state);
     if has_solve_ahead(state) {

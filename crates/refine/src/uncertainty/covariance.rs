@@ -43,9 +43,10 @@
 //! "Robust Statistics: The Approach Based on Influence Functions", 1986, 6.3 (ψ' in D); R. W. M.
 //! Wedderburn, "Quasi-likelihood functions", Biometrika 61(3), 1974 (one factor for all).
 
+use crate::linear::factor_error::FactorError;
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
-use crate::linear::sparse_cholesky::FactorError;
+use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::uncertainty::exposure_equations::{ExposurePattern, POSE};
 use crate::uncertainty::frame_sigma::FrameSigma;
@@ -153,28 +154,38 @@ const MIN_DETERMINED: f64 = 1e-6;
 
 /// Computes the inverse of the normal matrix and the dispersion at a solution.
 ///
-/// `normal`: H, with `tied` freedoms of the gauge tied; `scatter`: V of the pixels; `prior`: P; all
-/// on `pattern`, whose first `frames` slots are frames and the others the wall's shape.
-/// `curvature`: κ.
+/// `normal`: H, with its `factor` and with `tied` freedoms of the gauge tied; `scatter`: V of the
+/// pixels; `prior`: makes P, once V is no longer in memory; all on `pattern`, whose first `frames`
+/// slots are frames and the others the wall's shape. `curvature`: κ.
 ///
 /// # Errors
-/// [`FactorError`] if the normal matrix is singular.
+/// [`FactorError`] if the equations of the exposures are singular.
 pub fn compute_covariances(
     pattern: &Pattern,
     frames: usize,
-    normal: &NormalEquations,
+    (normal, factor): (&NormalEquations, &Factor),
     tied: usize,
-    scatter: &[Block],
-    prior: &[Block],
+    scatter: Vec<Block>,
+    prior: impl FnOnce() -> Vec<Block>,
     curvature: f64,
 ) -> Result<NoiseCovariance, FactorError> {
-    let of_exposures = traces_of_exposures(pattern, frames, normal, [scatter, prior])?;
-    let inverse = SelectedInverse::new(pattern, normal)?;
-    let [of_scatter, of_prior] = [scatter, prior].map(|of| trace_of_product(pattern, &inverse, of));
+    let exposures = ExposurePattern::new(pattern, frames);
+    let of_exposures = inverse_of_exposures(pattern, &exposures, normal)?;
+    let inverse = SelectedInverse::new(factor);
+    // tr(J⁻¹ E Q Eᵀ).
+    let trace = |blocks: &[Block]| {
+        trace_of_product(pattern, &inverse, blocks)
+            - trace_of_product(
+                &exposures.slots,
+                &of_exposures,
+                &exposures.blocks(pattern, blocks),
+            )
+    };
+    let of_pixels = trace(&scatter) / curvature.powi(2);
+    drop(scatter);
+    let of_prior = trace(&prior());
     let of_shape = (pattern.columns() - frames) * FRAME_PARAMETERS;
     let freedoms = (frames * POSE + of_shape - tied) as f64;
-    let of_pixels = (of_scatter - of_exposures[0]) / curvature.powi(2);
-    let of_prior = of_prior - of_exposures[1];
     // The freedoms that pixels determine, by their share of the information.
     let determined = freedoms - of_prior;
     Ok(NoiseCovariance {
@@ -189,19 +200,15 @@ pub fn compute_covariances(
     })
 }
 
-/// `tr(H_ee⁻¹ Q_ee)` of these matrices Q, e being the exposures.
-fn traces_of_exposures(
+/// `H_ee⁻¹`, e being the exposures.
+fn inverse_of_exposures(
     pattern: &Pattern,
-    frames: usize,
+    exposures: &ExposurePattern,
     normal: &NormalEquations,
-    matrices: [&[Block]; 2],
-) -> Result<[f64; 2], FactorError> {
-    let exposures = ExposurePattern::new(pattern, frames);
-    let inverse = SelectedInverse::new(&exposures.slots, &exposures.equations(pattern, normal))?;
-    Ok(matrices.map(|of| {
-        let of = exposures.blocks(pattern, of);
-        trace_of_product(&exposures.slots, &inverse, &of)
-    }))
+) -> Result<SelectedInverse, FactorError> {
+    let symbolic = SymbolicFactorisation::new(&exposures.slots)?;
+    let equations = exposures.equations(pattern, normal);
+    Ok(SelectedInverse::new(&symbolic.factorise(&equations, 0.0)?))
 }
 
 /// `tr(H⁻¹ Q)` of a symmetric matrix Q with the upper `blocks` on `pattern`.
@@ -224,6 +231,11 @@ fn trace_of_product(pattern: &Pattern, inverse: &SelectedInverse, blocks: &[Bloc
 mod tests {
     use super::*;
     use nalgebra::DMatrix;
+
+    fn factorise<'n>(pattern: &Pattern, normal: &'n NormalEquations) -> Factor<'n> {
+        let symbolic = SymbolicFactorisation::new(pattern).unwrap();
+        symbolic.factorise(normal, 0.0).unwrap()
+    }
 
     #[test]
     fn csv_has_a_line_per_frame_and_pair_and_39_columns() {
@@ -254,23 +266,27 @@ mod tests {
             normal.add_block(&pattern, k, k + 1, &(Block::identity() * -1.0));
         }
         let none = vec![Block::zeros(); pattern.blocks()];
+        let factor = factorise(&pattern, &normal);
+        let normal = (&normal, &factor);
         let at = |scatter: &[Block], prior: &[Block], curvature: f64| {
-            let found =
-                compute_covariances(&pattern, 3, &normal, 0, scatter, prior, curvature).unwrap();
+            let scatter = scatter.to_vec();
+            let prior = || prior.to_vec();
+            let found = compute_covariances(&pattern, 3, normal, 0, scatter, prior, curvature);
+            let found = found.unwrap();
             let factor = found.variance_factor;
             let block = |j, k| found.inverse.block(j, k).unwrap() * factor;
             (factor, [block(0, 0), block(1, 1), block(0, 1)])
         };
-        let one = at(&normal.blocks, &none, 1.0);
+        let one = at(&normal.0.blocks, &none, 1.0);
         assert!((one.0 - 1.0).abs() < 1e-12);
-        let two = at(&normal.blocks, &normal.blocks, 1.0);
+        let two = at(&normal.0.blocks, &normal.0.blocks, 1.0);
         assert!((two.1[1] - one.1[1] * 2.0).norm() < 1e-12);
-        let bent = at(&normal.blocks, &normal.blocks, 0.5);
+        let bent = at(&normal.0.blocks, &normal.0.blocks, 0.5);
         assert!((bent.1[1] - one.1[1] * 5.0).norm() < 1e-12);
         assert!((one.1[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
         assert!((one.1[2][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
-        let mut exposed = normal.blocks.clone();
-        for (block, normal) in exposed.iter_mut().zip(&normal.blocks) {
+        let mut exposed = normal.0.blocks.clone();
+        for (block, normal) in exposed.iter_mut().zip(&normal.0.blocks) {
             let exposures = normal.fixed_view::<2, 2>(POSE, POSE) * 9.0;
             let mut part = block.fixed_view_mut::<2, 2>(POSE, POSE);
             part += exposures;
@@ -278,8 +294,8 @@ mod tests {
         let same = at(&exposed, &none, 1.0);
         assert!((same.0 - 1.0).abs() < 1e-12);
         // With the gauge tied, two of 18 freedoms are no freedoms.
-        let tied =
-            compute_covariances(&pattern, 3, &normal, 2, &normal.blocks, &none, 1.0).unwrap();
+        let scatter = normal.0.blocks.clone();
+        let tied = compute_covariances(&pattern, 3, normal, 2, scatter, || none, 1.0).unwrap();
         assert!((tied.variance_factor - 18.0 / 16.0).abs() < 1e-12);
     }
 
@@ -307,7 +323,9 @@ mod tests {
         let mut normal = NormalEquations::zeros(&pattern);
         normal.blocks = blocks(&h);
         let none = vec![Block::zeros(); pattern.blocks()];
-        let found = compute_covariances(&pattern, 2, &normal, 0, &blocks(&q), &none, 1.0).unwrap();
+        let factor = factorise(&pattern, &normal);
+        let normal = (&normal, &factor);
+        let found = compute_covariances(&pattern, 2, normal, 0, blocks(&q), || none, 1.0).unwrap();
         let poses: Vec<usize> = (0..2 * FRAME_PARAMETERS)
             .filter(|k| k % FRAME_PARAMETERS < POSE)
             .collect();

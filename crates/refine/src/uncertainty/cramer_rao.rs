@@ -196,8 +196,8 @@ fn invert(
     normal: &NormalEquations,
     count: usize,
 ) -> Result<Covariances, RefineError> {
-    let inverse = SelectedInverse::new(problem.pattern(), normal)
-        .map_err(|source| problem.factor_error(source))?;
+    let factor = problem.symbolic().factorise(normal, 0.0);
+    let inverse = SelectedInverse::new(&factor.map_err(|source| problem.factor_error(source))?);
     let pose = |row: usize, column: usize| {
         let block = inverse.block(row, column);
         block.map_or(Matrix6::from_element(f64::NAN), |block| {

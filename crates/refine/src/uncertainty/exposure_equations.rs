@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(exposures.slots.columns(), 2);
         let equations = exposures.equations(&pattern, &normal);
         let symbolic = SymbolicFactorisation::new(&exposures.slots).unwrap();
-        let factor = symbolic.factorise(&exposures.slots, &equations, 0.0);
+        let factor = symbolic.factorise(&equations, 0.0);
         let right = |frame: usize| {
             let number = |row: usize, _| (1.3 * (row + 8 * frame) as f64).sin();
             SMatrix::<f64, FRAME_PARAMETERS, 1>::from_fn(number)

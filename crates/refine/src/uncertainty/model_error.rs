@@ -42,7 +42,7 @@ use crate::linear::normal_equations::{Block, Pattern};
 use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
 use crate::model::problem_error::ProblemError;
 use crate::model::significance::normal_quantile;
-use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
+use crate::parameters::calibration::SHARED_PARAMETERS;
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::points::equations::PointEquations;
 use crate::problem::patch_scores::PatchScores;
@@ -89,21 +89,22 @@ pub struct Patches {
     pub dispersion: f64,
 }
 
-/// Draws of the errors of an estimate.
-pub struct ErrorDraws {
-    /// Mean of `zᵀ H⁻¹ z − z_eᵀ H_ee⁻¹ z_e` of the patches' scores.
-    quadratic: f64,
-    /// Draws of the step δ of every slot.
-    slots: Vec<Vec<FrameStep>>,
-    /// Draws of the step of the shared parameters.
-    shared: Vec<Kappa>,
+/// Draws of the errors of an estimate, batch by batch.
+pub struct ErrorDraws(Vec<DrawBatch>);
+
+/// A batch of draws: steps δ, a column each.
+struct DrawBatch {
+    /// Of every slot.
+    slots: Vec<BatchBlock>,
+    /// Of the shared parameters.
+    shared: SharedBatch,
 }
 
 impl EstimateErrors {
     /// Finds the size of patches over which errors go together, and draws the errors that they and
     /// the prior make in the poses; those of the prior alone if the dispersion of single blocks is
     /// the largest. None if the prior leaves a pose free. At the end of the solve: the `factor` of
-    /// the normal matrix, and the `curvature` κ.
+    /// the normal matrix, the `curvature` κ, and the scores of the `finest` patches.
     ///
     /// # Errors
     /// [`ProblemError`]: a frame that cannot be read, a singular normal matrix.
@@ -111,7 +112,7 @@ impl EstimateErrors {
         solution: &Solution,
         (factor, curvature): (&Factor, f64),
         posterior: Option<&Posterior>,
-        of_noise: &NoiseCovariance,
+        (of_noise, finest): (&NoiseCovariance, &PatchScores),
         alpha: f64,
     ) -> Result<Option<Self>, ProblemError> {
         let problem = &solution.problem;
@@ -122,45 +123,39 @@ impl EstimateErrors {
         let symbolic = SymbolicFactorisation::new(&exposures.slots);
         let symbolic = symbolic.map_err(|source| problem.factor_error(source))?;
         let equations = exposures.equations(pattern, normal);
-        let of_exposures = symbolic.factorise(&exposures.slots, &equations, 0.0);
+        let of_exposures = symbolic.factorise(&equations, 0.0);
         let of_exposures = of_exposures.map_err(|source| problem.factor_error(source))?;
-        let (prior, _) = problem.prior_information(&solution.unknowns);
-        let Some(prior) = PriorRoot::of(pattern, &prior) else {
+        let prior = PriorRoot::of(pattern, &problem.prior_information(&solution.unknowns).0);
+        let Some(prior) = prior else {
             return Ok(None);
         };
-        let draw = |scores: &PatchScores, posterior, curvature| {
-            let system = System {
-                factor,
-                exposures: (&exposures, &of_exposures),
-                posterior,
-                scores,
-                prior: &prior,
-                points: problem.points(),
-                curvature,
-            };
-            system.draw(pattern.columns(), frames)
+        let system = System {
+            factor,
+            exposures: (&exposures, &of_exposures),
+            prior: &prior,
+            points: problem.points(),
+            slots: pattern.columns(),
+            frames,
         };
-        let from_to = (&solution.linearised_at, &solution.unknowns);
-        let gradients = problem.block_gradients(&solution.linearisation, from_to)?;
-        let finest = problem.patch_scores(&gradients);
         let mut doubled: Option<PatchScores> = None;
         let mut finest_dispersion = None;
-        let mut largest: Option<(ErrorDraws, Patches)> = None;
+        let mut largest: Option<(Option<PatchScores>, Patches)> = None;
         for blocks in PATCH_BLOCKS {
-            let scores = doubled.as_ref().unwrap_or(&finest);
-            let draws = draw(scores, posterior, curvature);
-            let dispersion = draws.quadratic / of_noise.determined;
+            let scores = doubled.as_ref().unwrap_or(finest);
+            let dispersion = system.quadratic(scores, curvature) / of_noise.determined;
             finest_dispersion.get_or_insert(dispersion);
             let before = largest.as_ref().map_or(0.0, |l| l.1.dispersion);
             let by_chance = of_noise.pixel_dispersion * chance_factor(scores.len(), alpha);
+            let next = scores.doubled();
             if dispersion > before.max(by_chance) {
-                largest = Some((draws, Patches { blocks, dispersion }));
+                largest = Some((doubled.take(), Patches { blocks, dispersion }));
             }
-            doubled = Some(scores.doubled());
+            doubled = Some(next);
         }
+        drop(doubled);
         Ok(Some(match largest {
-            Some((draws, patches)) => Self {
-                draws,
+            Some((scores, patches)) => Self {
+                draws: system.draw(scores.as_ref().unwrap_or(finest), posterior, curvature),
                 patches: Some(patches),
                 noise: None,
             },
@@ -170,9 +165,9 @@ impl EstimateErrors {
                 let scale = if share > 0.0 { share.sqrt() } else { 1.0 };
                 let has_shape = pattern.columns() > frames;
                 Self {
-                    draws: draw(&PatchScores::default(), None, curvature),
+                    draws: system.draw(&PatchScores::default(), None, curvature),
                     patches: None,
-                    noise: has_shape.then(|| draw(&finest, posterior, curvature * scale)),
+                    noise: has_shape.then(|| system.draw(finest, posterior, curvature * scale)),
                 }
             }
         }))
@@ -198,35 +193,44 @@ fn chance_factor(patches: usize, alpha: f64) -> f64 {
 impl ErrorDraws {
     /// Number of draws.
     pub fn count(&self) -> usize {
-        self.shared.len()
+        self.0.len() * BATCH
     }
 
     /// One draw of the errors of the slots from `first` on.
     pub fn of_slots(&self, first: usize, draw: usize) -> Vec<FrameStep> {
-        self.slots[first..].iter().map(|slot| slot[draw]).collect()
+        let slots = self.0[draw / BATCH].slots[first..].iter();
+        slots
+            .map(|slot| slot.column(draw % BATCH).into_owned())
+            .collect()
     }
 
     /// Covariance of the errors of two slots.
     pub fn of_pair(&self, j: usize, k: usize) -> Block {
-        let products = self.slots[j].iter().zip(&self.slots[k]);
-        let sum: Block = products.map(|(j, k)| j * k.transpose()).sum();
-        sum / self.shared.len() as f64
+        let batches = self.0.iter();
+        let sum: Block = batches
+            .map(|batch| batch.slots[j] * batch.slots[k].transpose())
+            .sum();
+        sum / self.count() as f64
     }
 
     /// Mean square of the errors of a point of the wall, m².
     pub fn mean_square(&self, point: &PointJacobians) -> f64 {
-        let square = |draw: usize| {
-            let moved = point.moved(|slot| self.slots[slot][draw], &self.shared[draw]);
+        let square = |batch: &DrawBatch| {
+            let of_slots = point.slots.iter();
+            let of_slots = of_slots.map(|(slot, jacobian)| jacobian * batch.slots[*slot]);
+            let moved = of_slots.fold(point.shared * batch.shared, |sum, moved| sum + moved);
             moved.norm_squared()
         };
-        let draws = self.shared.len();
-        (0..draws).map(square).sum::<f64>() / draws as f64
+        self.0.iter().map(square).sum::<f64>() / self.count() as f64
     }
 
     /// Covariance of the errors of the shared parameters.
     pub fn of_shared(&self) -> SharedBlock {
-        let sum: SharedBlock = self.shared.iter().map(|k| k * k.transpose()).sum();
-        sum / self.shared.len() as f64
+        let batches = self.0.iter();
+        let sum: SharedBlock = batches
+            .map(|batch| batch.shared * batch.shared.transpose())
+            .sum();
+        sum / self.count() as f64
     }
 }
 
@@ -251,18 +255,18 @@ impl ModelErrorReport {
     }
 }
 
-/// The equations, and the scores of patches that are drawn from.
+/// The equations of an estimate.
 struct System<'s> {
     factor: &'s Factor<'s>,
     /// Exposures, and the factor of their equations for known poses.
     exposures: (&'s ExposurePattern, &'s Factor<'s>),
-    posterior: Option<&'s Posterior>,
-    scores: &'s PatchScores,
     prior: &'s PriorRoot,
     /// Measured points, whose noise adds to that of the prior.
     points: Option<&'s PointEquations>,
-    /// κ.
-    curvature: f64,
+    /// Number of slots.
+    slots: usize,
+    /// Number of those that are frames, the first ones.
+    frames: usize,
 }
 
 /// Right sides or steps of a batch of draws: a column each.
@@ -271,70 +275,77 @@ type BatchBlock = SMatrix<f64, FRAME_PARAMETERS, BATCH>;
 type SharedBatch = SMatrix<f64, SHARED_PARAMETERS, BATCH>;
 
 impl System<'_> {
-    /// Draws of the steps of `count` slots, of which the first `frames` are frames, that scores
-    /// with random signs make.
-    fn draw(&self, count: usize, frames: usize) -> ErrorDraws {
-        let batches =
-            (0..BATCHES as usize).par_map(|batch| self.draw_batch(batch as u64, count, frames));
-        let mut draws = ErrorDraws {
-            quadratic: 0.0,
-            slots: vec![Vec::new(); count],
-            shared: Vec::new(),
-        };
-        for (quadratic, steps, shared) in batches {
-            draws.quadratic += quadratic / (BATCHES as usize * BATCH) as f64;
-            for (slot, step) in draws.slots.iter_mut().zip(&steps) {
-                slot.extend((0..BATCH).map(|d| step.column(d).into_owned()));
-            }
-            draws
-                .shared
-                .extend((0..BATCH).map(|d| shared.column(d).into_owned()));
-        }
-        draws
+    /// Mean of `zᵀ H⁻¹ z − z_eᵀ H_ee⁻¹ z_e` over draws of scores with random signs.
+    fn quadratic(&self, scores: &PatchScores, curvature: f64) -> f64 {
+        let batches = (0..BATCHES as usize).par_map(|batch| {
+            let mut z = vec![BatchBlock::zeros(); self.slots];
+            add_signed_scores(scores, curvature, &mut random_of(batch), &mut z);
+            let (pattern, factor) = self.exposures;
+            let exposures_alone = pattern.rows(&z[..self.frames]);
+            let product = |a: &[BatchBlock], b: &[BatchBlock]| -> f64 {
+                a.iter().zip(b).map(|(a, b)| a.component_mul(b).sum()).sum()
+            };
+            product(&z, &self.factor.solve(&z))
+                - product(&exposures_alone, &factor.solve(&exposures_alone))
+        });
+        let draws = (BATCHES as usize * BATCH) as f64;
+        batches.into_iter().map(|quadratic| quadratic / draws).sum()
     }
 
-    /// A batch of draws: the sum of `zᵀ H⁻¹ z − z_eᵀ H_ee⁻¹ z_e`, and the steps.
-    fn draw_batch(
+    /// Draws of the steps that scores with random signs and the prior make.
+    fn draw(
         &self,
-        batch: u64,
-        count: usize,
-        frames: usize,
-    ) -> (f64, Vec<BatchBlock>, SharedBatch) {
-        let mut rng = ChaCha8Rng::seed_from_u64(batch);
-        let mut z = vec![BatchBlock::zeros(); count];
-        let mut z_shared = SharedBatch::zeros();
-        for score in self.scores.iter() {
-            let signs =
-                SMatrix::<f64, 1, BATCH>::from_fn(|_, _| if rng.random() { 1.0 } else { -1.0 })
-                    / self.curvature;
-            for (slot, gradient) in &score.slots {
-                z[*slot] += gradient * signs;
+        scores: &PatchScores,
+        posterior: Option<&Posterior>,
+        curvature: f64,
+    ) -> ErrorDraws {
+        let batch = |batch: usize| {
+            let mut random = random_of(batch);
+            let mut z = vec![BatchBlock::zeros(); self.slots];
+            let z_shared = add_signed_scores(scores, curvature, &mut random, &mut z);
+            self.prior.add_draws(&mut z, &mut random);
+            if let Some(points) = self.points {
+                points.add_draws(&mut z[self.frames..], &mut random);
             }
-            z_shared += score.shared * signs;
-        }
-        let of_pixels = self.factor.solve(&z);
-        let (pattern, factor) = self.exposures;
-        let exposures_alone = pattern.rows(&z[..frames]);
-        let of_exposures = factor.solve(&exposures_alone);
-        let product = |a: &[BatchBlock], b: &[BatchBlock]| -> f64 {
-            a.iter().zip(b).map(|(a, b)| a.component_mul(b).sum()).sum()
+            let mut slots = self.factor.solve(&z);
+            let shared = posterior.map_or(SharedBatch::zeros(), |posterior| {
+                posterior.steps_of_shared(&z, &z_shared)
+            });
+            if let Some(posterior) = posterior {
+                for (step, w) in slots.iter_mut().zip(&posterior.w) {
+                    *step -= w * shared;
+                }
+            }
+            DrawBatch { slots, shared }
         };
-        let quadratic = product(&z, &of_pixels) - product(&exposures_alone, &of_exposures);
-        self.prior.add_draws(&mut z, &mut rng);
-        if let Some(points) = self.points {
-            points.add_draws(&mut z[frames..], &mut rng);
-        }
-        let mut steps = self.factor.solve(&z);
-        let shared = self.posterior.map_or(SharedBatch::zeros(), |posterior| {
-            posterior.steps_of_shared(&z, &z_shared)
-        });
-        if let Some(posterior) = self.posterior {
-            for (step, w) in steps.iter_mut().zip(&posterior.w) {
-                *step -= w * shared;
-            }
-        }
-        (quadratic, steps, shared)
+        ErrorDraws((0..BATCHES as usize).par_map(batch))
     }
+}
+
+/// Random numbers of a batch.
+fn random_of(batch: usize) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(batch as u64)
+}
+
+/// Adds scores with random signs over κ to the right sides of the slots; those of the shared
+/// parameters.
+fn add_signed_scores(
+    scores: &PatchScores,
+    curvature: f64,
+    random: &mut ChaCha8Rng,
+    z: &mut [BatchBlock],
+) -> SharedBatch {
+    let mut z_shared = SharedBatch::zeros();
+    for score in scores.iter() {
+        let signs =
+            SMatrix::<f64, 1, BATCH>::from_fn(|_, _| if random.random() { 1.0 } else { -1.0 })
+                / curvature;
+        for (slot, gradient) in &score.slots {
+            z[*slot] += gradient * signs;
+        }
+        z_shared += score.shared * signs;
+    }
+    z_shared
 }
 
 /// Cholesky factor L of the prior's information P, in which a frame has a block with itself and at

@@ -6,6 +6,7 @@
 //! it another may be observed.
 
 use crate::linear::bordered_system::{BorderBlock, SchurComplement, SharedBlock, reduce_to_shared};
+use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
@@ -46,26 +47,29 @@ pub struct Posterior {
 
 impl Posterior {
     /// Observes the curvature κ ([`crate::uncertainty::observed_curvature`]) at a solution and
-    /// eliminates the poses; no posterior if no shared parameter was estimated. Where the normal
-    /// matrix is singular and none was, nothing is known of the poses, and κ is 1.
+    /// eliminates the poses: κ, the posterior if a shared parameter was estimated, and the factor
+    /// of the normal matrix. Where that is singular and none was, nothing is known of the poses,
+    /// and κ is 1.
     ///
     /// # Errors
     /// [`ProblemError::Factor`] if shared parameters were estimated and the poses' normal matrix is
     /// singular; a frame that has to be read again and cannot be.
-    pub fn with_curvature(
-        solution: &Solution,
+    pub fn with_curvature<'s>(
+        solution: &'s Solution,
         scatter: &ScoreScatter,
-    ) -> Result<(ObservedCurvature, Option<Self>), ProblemError> {
+    ) -> Result<(ObservedCurvature, Option<Self>, Option<Factor<'s>>), ProblemError> {
         let (problem, at) = (&solution.problem, &solution.linearisation);
         let borders = at.border.as_ref().zip(scatter.border.as_ref());
         let pattern = problem.pattern();
-        // The factor is large; it is not kept.
-        let factor = match problem.symbolic().factorise(pattern, &at.normal, 0.0) {
+        let factor = match problem.symbolic().factorise(&at.normal, 0.0) {
             Ok(factor) => factor,
-            Err(_) if borders.is_none() => return Ok((ObservedCurvature::AS_PREDICTED, None)),
+            Err(_) if borders.is_none() => {
+                return Ok((ObservedCurvature::AS_PREDICTED, None, None));
+            }
             Err(source) => return Err(problem.factor_error(source)),
         };
-        let curvature = observe_curvature(problem, (at, &solution.linearised_at), &factor)?;
+        let at_end = (at, &solution.linearised_at);
+        let curvature = observe_curvature(problem, at_end, &factor, &scatter.signed)?;
         let posterior = borders.map(|(border, border_scatter)| {
             let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
             let (prior, prior_border) = problem.other_information(&solution.unknowns);
@@ -74,7 +78,7 @@ impl Posterior {
                 / curvature.effective().powi(2);
             Self { w, schur, scatter }
         });
-        Ok((curvature, posterior))
+        Ok((curvature, posterior, Some(factor)))
     }
 
     /// Covariance `Σ_κ` of the `free` parameters, zero elsewhere; None if S is singular.

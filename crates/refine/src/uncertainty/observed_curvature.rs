@@ -1,18 +1,19 @@
-//! The derivative D of the score over the normal matrix H, as observed at the end of a solve.
+//! The derivative D of the score over the normal matrix H, as observed at an estimate.
 //!
 //! The estimate is displaced by what noise may have done to it: by `δ = H⁻¹ z`, with
 //! `z = Σ ε_b g_b` of the gradients of blocks of the wall, and random signs ε. In the mean over the
 //! signs all directions count that pixels determine, each by its variance. There the score changes
-//! by `D δ`, where the equations predict `H δ`. With P the prior's and the points' part, in both,
+//! by `D δ`, where the equations predict `H δ`. With g the pixels' part of the score, and P the
+//! prior's and the points' part of H,
 //!
-//! `κ = δᵀ(g(x + δ) − g(x) − P δ) / δᵀ(H − P) δ`,
+//! `κ = δᵀ(g(x + δ) − g(x)) / δᵀ(H − P) δ`,
 //!
 //! over the poses' part of δ. Over all unknowns of all frames, what single tiles contribute by
 //! chance averages out, so a share of the tiles is enough. κ is about 0.9 for Gaussian residuals,
 //! as weights fall where residuals grow (`ψ' ≤ ω`), and far less where the slopes of a faint wall
 //! are noise: then the score hardly changes, and the estimate is much less certain than H says.
 //!
-//! What the score changes by beyond this, `d = g(x + δ) − g(x) − P δ − κ (H − P) δ`, is that of the
+//! What the score changes by beyond this, `d = g(x + δ) − g(x) − κ (H − P) δ`, is that of the
 //! noise: samples that move by a pixel have other noise, and so has their product with slopes that
 //! are noise, too. Relative to the change that is expected it is
 //!
@@ -20,7 +21,9 @@
 //!
 //! Contributions of tiles to d are independent, so that a share of one tile in n, which counts n
 //! times, shows n times the square. With a derivative `κ H (1 + N)`, N of the size η, a step leaves
-//! η of the error, and the variance of the estimate is `E[(1 + N)⁻²] ≈ 1 + 3 η²` times that with κ.
+//! η of the error, and the estimate `x − N (x − x̂)` instead of x̂ has the variance `1 + η²` times that
+//! with κ, to first order in N. (Simulated faint walls of known poses: 1.00 to 1.16 times its root
+//! for η from 0.1 to 0.5.)
 //! On a faint wall η falls from one pyramid level to the next coarser one, where noise is less and
 //! goes together over more of the wall.
 //!
@@ -31,7 +34,7 @@
 //! conditions", 1967; M. F. Hutchinson, "A stochastic estimator of the trace of the influence
 //! matrix for Laplacian smoothing splines", Communications in Statistics 18(3), 1989 (the signs).
 
-use crate::linear::normal_equations::{NormalEquations, Pattern};
+use crate::linear::normal_equations::{Block, Pattern};
 use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
@@ -40,8 +43,6 @@ use crate::parameters::unknowns::Unknowns;
 use crate::problem::linearisation::Linearisation;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::uncertainty::exposure_equations::POSE;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 /// Curvature of a solution whose score does not change, or the wrong way: with it σ are a thousand
 /// times those of a good solution, and nothing is believed.
@@ -81,7 +82,7 @@ impl ObservedCurvature {
 }
 
 /// Observes κ and η where the problem is linearised, `at` the unknowns `from`; `factor`: of the
-/// normal matrix there.
+/// normal matrix there, `scores`: z of every slot.
 ///
 /// # Errors
 /// A frame that has to be read again and cannot be.
@@ -89,33 +90,26 @@ pub fn observe_curvature(
     problem: &PhotometricProblem,
     (at, from): (&Linearisation, &Unknowns),
     factor: &Factor,
+    scores: &[FrameStep],
 ) -> Result<ObservedCurvature, ProblemError> {
-    let scores = scores_with_random_signs(problem, at);
-    let step = factor.step(&scores);
-    let to = problem.stepped(from, &step, &Kappa::zeros());
-    let stride = problem.mean_change_share(at);
-    let next = match stride {
-        Some(stride) => problem.linearise_change(at, (from, &to), stride)?,
-        None => problem.linearise_at(&to)?,
-    };
-    let no_shared = Kappa::zeros();
-    let (_, predicted, _) = at.predict(problem.pattern(), (&step, &no_shared));
-    let (blocks, border) = problem.other_information(from);
-    let mut others = Linearisation {
-        border: Some(border),
-        ..problem.zero_linearisation()
-    };
-    others.normal.blocks = blocks;
-    let (_, of_others, _) = others.predict(problem.pattern(), (&step, &no_shared));
     let frames = from.frames.len();
-    let observed = poses_part(frames, |k| {
-        next.normal.gradient[k] - at.normal.gradient[k] - of_others[k]
-    });
-    let expected = poses_part(frames, |k| predicted[k] - of_others[k]);
+    let pattern = problem.pattern();
+    let step = factor.step(scores);
+    let to = problem.stepped(from, &step, &Kappa::zeros());
+    let mut predicted = pattern.product(&at.normal.blocks, &step);
+    let (others, _) = problem.other_information(from);
+    let of_others = pattern.product(&others, &step);
+    let of_frames = information_of_frames(pattern, (&at.normal.blocks, &others), frames);
+    drop(others);
+    for (predicted, of_others) in predicted.iter_mut().zip(&of_others) {
+        *predicted -= of_others;
+    }
+    let stride = problem.mean_change_share(at);
+    let change = problem.pixel_gradient_change(at, (from, &to), (&step, &predicted), stride)?;
+    let [observed, expected] = [change, predicted].map(|gradient| poses_part(&gradient[..frames]));
     let along = |gradient: &[FrameStep]| dot(&step, gradient);
     let mean = along(&observed) / along(&expected);
-    // NaN, too, is none.
-    if !(mean > NO_CURVATURE) {
+    if mean.is_nan() || mean <= NO_CURVATURE {
         return Ok(ObservedCurvature::NONE);
     }
     let mut beyond = vec![FrameStep::zeros(); step.len()];
@@ -123,30 +117,28 @@ pub fn observe_curvature(
         *beyond = observed - expected * mean;
     }
     let square = -dot(&factor.step(&beyond), &beyond) / stride.unwrap_or(1) as f64;
-    let dispersion = -dot(&step[..frames], &scores) / (POSE * frames) as f64;
+    let dispersion = -dot(&step[..frames], scores) / (POSE * frames) as f64;
     let curvature = ObservedCurvature {
         mean: mean.min(1.0),
         scatter: (square / (mean.powi(2) * along(&expected))).sqrt(),
-        information: 0.0,
+        information: of_frames / dispersion,
     };
-    let of_frames = information_of_frames(problem.pattern(), (&at.normal, &others.normal), frames);
-    let curvature = ObservedCurvature {
-        information: curvature.effective().powi(2) / dispersion * of_frames,
+    Ok(ObservedCurvature {
+        information: curvature.information * curvature.effective().powi(2),
         ..curvature
-    };
-    Ok(curvature)
+    })
 }
 
 /// Geometric mean of `det(H_kk − P_kk)^(1/6)` of the poses of all frames of which pixels tell all
-/// of it; `(H, P)`: normal equations, and the part of what is not pixels.
+/// of it; the blocks of H, and of P.
 fn information_of_frames(
     pattern: &Pattern,
-    (normal, others): (&NormalEquations, &NormalEquations),
+    (normal, others): (&[Block], &[Block]),
     frames: usize,
 ) -> f64 {
     let logarithms = (0..frames).filter_map(|k| {
         let own = pattern.block_index(k, k)?;
-        let of_pixels = normal.blocks[own] - others.blocks[own];
+        let of_pixels = normal[own] - others[own];
         let determinant = of_pixels.fixed_view::<POSE, POSE>(0, 0).determinant();
         (determinant > 0.0).then(|| determinant.ln() / POSE as f64)
     });
@@ -154,33 +146,19 @@ fn information_of_frames(
     f64::exp(sum / f64::max(count, 1.0))
 }
 
-/// Gradients of the frames, of their poses alone.
-fn poses_part(frames: usize, gradient: impl Fn(usize) -> FrameStep) -> Vec<FrameStep> {
-    let of_pose = |k| {
+/// Gradients of their poses alone.
+fn poses_part(gradient: &[FrameStep]) -> Vec<FrameStep> {
+    let of_pose = |gradient: &FrameStep| {
         let mut part = FrameStep::zeros();
-        part.rows_mut(0, POSE).copy_from(&gradient(k).rows(0, POSE));
+        part.rows_mut(0, POSE).copy_from(&gradient.rows(0, POSE));
         part
     };
-    (0..frames).map(of_pose).collect()
+    gradient.iter().map(of_pose).collect()
 }
 
 /// Sum of the products of steps and gradients, as far as there are both.
 fn dot(steps: &[FrameStep], gradients: &[FrameStep]) -> f64 {
     steps.iter().zip(gradients).map(|(s, g)| s.dot(g)).sum()
-}
-
-/// `z`, for every slot.
-fn scores_with_random_signs(problem: &PhotometricProblem, at: &Linearisation) -> Vec<FrameStep> {
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut scores = vec![FrameStep::zeros(); problem.pattern().columns()];
-    for block in &at.block_gradients {
-        let sign = if rng.random() { 1.0 } else { -1.0 };
-        let scale = sign * problem.information();
-        for (slot, gradient) in block.slots.iter().zip(&block.slot_gradients) {
-            scores[*slot] += gradient * scale;
-        }
-    }
-    scores
 }
 
 #[cfg(test)]
@@ -190,6 +168,8 @@ mod tests {
     use crate::samples::sampling::Sampling;
     use crate::solver::argmin_glue::solve;
     use crate::solver::stopping::Stopping;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, Normal};
     use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
 
@@ -222,11 +202,10 @@ mod tests {
         };
         let solution = solve(ring.problem_of(Sampling::of(1)), stopping).unwrap();
         let (problem, at) = (&solution.problem, &solution.linearisation);
-        let factor = problem
-            .symbolic()
-            .factorise(problem.pattern(), &at.normal, 0.0);
+        let factor = problem.symbolic().factorise(&at.normal, 0.0);
+        let scores = problem.signed_scores(at);
         let at_end = (at, &solution.linearised_at);
-        observe_curvature(problem, at_end, &factor.unwrap()).unwrap()
+        observe_curvature(problem, at_end, &factor.unwrap(), &scores).unwrap()
     }
 
     #[test]

@@ -89,8 +89,8 @@ pub fn estimate_readout(
     };
     let scatter = solution.problem.score_scatter(&solution.linearisation);
     let posterior = match Posterior::with_curvature(&solution, &scatter) {
-        Ok((_, Some(posterior))) => posterior,
-        Ok((_, None)) | Err(ProblemError::Factor { .. }) => return Ok(None),
+        Ok((_, Some(posterior), _)) => posterior,
+        Ok((_, None, _)) | Err(ProblemError::Factor { .. }) => return Ok(None),
         Err(error) => return Err(error),
     };
     let Some(covariance) = posterior.covariance(&calibration.free) else {

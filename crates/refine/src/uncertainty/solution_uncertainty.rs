@@ -1,8 +1,9 @@
 //! Uncertainty of a solution: of its poses, and of the shared parameters that it does not observe.
 
 use crate::linear::bordered_system::SharedBlock;
+use crate::linear::factor_error::FactorError;
 use crate::linear::normal_equations::Pattern;
-use crate::linear::sparse_cholesky::{Factor, FactorError};
+use crate::linear::sparse_cholesky::Factor;
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
@@ -40,7 +41,8 @@ pub struct SolutionUncertainty {
 }
 
 impl SolutionUncertainty {
-    /// Computes the uncertainty of a solution, with the free parameters of `calibration`;
+    /// Computes the uncertainty of a solution, of which the gradients of the blocks of the wall are
+    /// taken, with the free parameters of `calibration`;
     /// `context`: with the solution's own κ and shape; `unseen`: errors by what is
     /// not seen of the wall's shape; `alpha`: rate of false alarms.
     ///
@@ -49,37 +51,41 @@ impl SolutionUncertainty {
     /// singular.
     pub fn at(
         context: &EstimationContext,
-        solution: &Solution,
+        solution: &mut Solution,
         calibration: &Calibration,
         unseen: &UnseenErrors,
         alpha: f64,
     ) -> Result<Self, ProblemError> {
+        let scatter = solution.problem.score_scatter(&solution.linearisation);
+        let finest = solution.take_patch_scores()?;
+        let solution = &*solution;
         let problem = &solution.problem;
         let frames = solution.unknowns.frames.len();
-        let scatter = problem.score_scatter(&solution.linearisation);
-        let (observed, posterior) = Posterior::with_curvature(solution, &scatter)?;
+        let (observed, posterior, factor) = Posterior::with_curvature(solution, &scatter)?;
         let curvature = observed.effective();
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
-        let (prior, _) = problem.other_information(&solution.unknowns);
-        let of_noise = compute_covariances(
-            problem.pattern(),
-            frames,
-            &solution.linearisation.normal,
-            problem.constrained_gauge_freedoms(),
-            &scatter.blocks,
-            &prior,
-            curvature,
-        );
+        let overdispersions = compute_overdispersions(context, solution, &scatter);
+        context.frames.release_pyramids();
+        let of_noise = factor.as_ref().and_then(|factor| {
+            let covariances = compute_covariances(
+                problem.pattern(),
+                frames,
+                (&solution.linearisation.normal, factor),
+                problem.constrained_gauge_freedoms(),
+                scatter.blocks,
+                || problem.other_information(&solution.unknowns).0,
+                curvature,
+            );
+            covariances.ok()
+        });
         // Poses without a covariance still count; they are reported as uncertain.
-        let total = match of_noise {
-            Ok(of_noise) => {
-                let normal = &solution.linearisation.normal;
-                let factor = problem.symbolic().factorise(problem.pattern(), normal, 0.0);
-                let factor = factor.map_err(|source| problem.factor_error(source))?;
-                let posterior = posterior.as_ref();
+        let total = match factor.zip(of_noise) {
+            Some((factor, of_noise)) => {
                 let at_end = (&factor, curvature);
-                let errors = EstimateErrors::find(solution, at_end, posterior, &of_noise, alpha)?;
+                let posterior = posterior.as_ref();
+                let errors =
+                    EstimateErrors::find(solution, at_end, posterior, (&of_noise, &finest), alpha)?;
                 if let (Some(shared), Some(errors)) = (&mut shared, &errors) {
                     *shared += errors.draws.of_shared();
                 }
@@ -97,7 +103,7 @@ impl SolutionUncertainty {
                     shared: of_shared.map(|(posterior, shared)| (posterior.w.clone(), shared)),
                 })
             }
-            Err(_) => None,
+            None => None,
         };
         let errors = total.as_ref().and_then(|total| total.errors.as_ref());
         let patches = errors.and_then(|errors| errors.patches);
@@ -116,7 +122,7 @@ impl SolutionUncertainty {
             },
             model_error: patches.map(|found| ModelErrorReport::new(&found, problem)),
             shared,
-            overdispersions: compute_overdispersions(context, solution, &scatter),
+            overdispersions,
             total,
             posterior,
         })

@@ -6,9 +6,10 @@
 //! from another one of its moment. Without photometric frames all keep their initial poses. No
 //! frame that does not know its place moves another, or is moved.
 
+use crate::linear::factor_error::FactorError;
 use crate::linear::normal_equations::{NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
-use crate::linear::sparse_cholesky::{FactorError, SymbolicFactorisation};
+use crate::linear::sparse_cholesky::SymbolicFactorisation;
 use crate::model::prior::Prior;
 use crate::parameters::calibration::Datum;
 use crate::parameters::frame_estimate::FrameEstimate;
@@ -115,12 +116,14 @@ impl Bridging<'_> {
         };
         for _ in 0..STEPS {
             let normal = linearise(estimates);
-            let factor = symbolic.factorise(&pattern, &normal, 0.0)?;
+            let factor = symbolic.factorise(&normal, 0.0)?;
             for (k, step) in gap.clone().zip(factor.step(&normal.gradient)) {
                 estimates[k] = estimates[k].retract(&step);
             }
         }
-        SelectedInverse::new(&pattern, &linearise(estimates))
+        let normal = linearise(estimates);
+        let factor = symbolic.factorise(&normal, 0.0)?;
+        Ok(SelectedInverse::new(&factor))
     }
 }
 
