@@ -220,8 +220,8 @@ fn may_normalise(setup: &Setup) -> bool {
 }
 
 /// True if the light of most frames that show something fits the model, as far as they tell: a
-/// shading explains it and they are inliers. Where they contradict the lengths of the prior they fit
-/// each other.
+/// shading explains it and they are inliers. Where they contradict the lengths of the prior they
+/// fit each other.
 fn fits_light(ended: &Estimation) -> bool {
     let prior_test = ended
         .refined

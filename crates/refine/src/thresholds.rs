@@ -27,14 +27,14 @@ pub mod prescreening {
 
 /// Thresholds of `stages/solve.rs`.
 pub mod last_solve {
-    /// Scatter η of the score's derivative, over its mean, above which the last solve is tried in
+    /// Share of noise in the energy of the texture's slopes above which the last solve is tried in
     /// pixels of twice the size.
     ///
     /// Higher: faint walls are solved in finer pixels, where steps wander. Lower: the tries take
     /// more time.
     ///
-    /// Chosen by: a step leaves η of the error; from a half on, most steps are waste.
-    pub const MAX_CURVATURE_SCATTER: f64 = 0.5;
+    /// Chosen by: slopes are mostly noise.
+    pub const MAX_SLOPE_NOISE: f64 = 0.5;
 }
 
 /// Thresholds of `points/wall_points.rs`.

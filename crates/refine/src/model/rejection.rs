@@ -89,9 +89,10 @@ impl RejectionReason {
         matches!(self, Self::Featureless | Self::Repeated(_))
     }
 
-    /// True if the image fits the other frames, and tells too little of its pose.
+    /// True if the image fits the other frames, and tells too little of its pose. If that is not
+    /// even known to a pixel, it may fit by chance.
     pub fn is_uncertain(&self) -> bool {
-        matches!(self, Self::Uncertain { wall_px } if wall_px.is_finite())
+        matches!(self, Self::Uncertain { wall_px } if *wall_px < 1.0)
     }
 
     /// True if the image shows a wall that does not fit the other frames.

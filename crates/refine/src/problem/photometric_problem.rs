@@ -241,6 +241,14 @@ impl<'a> PhotometricProblem<'a> {
         &self.context.calibration.tested
     }
 
+    /// Share of the noise in the energy of the slopes that align frames, 0 to 1; 0 if they are not
+    /// filtered.
+    pub fn slope_noise(&self) -> f64 {
+        self.denoiser
+            .as_ref()
+            .map_or(0.0, |denoiser| denoiser.slope_noise)
+    }
+
     /// Cost and normal equations at the initial unknowns, if they are known already.
     pub fn initial_linearisation(&self) -> Option<&Linearisation> {
         self.initial.as_ref()

@@ -15,7 +15,7 @@ use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::shape;
 use crate::stages::state::{Estimation, GlobalSolve, LastSolve, PipelineState};
-use crate::thresholds::last_solve::MAX_CURVATURE_SCATTER;
+use crate::thresholds::last_solve::MAX_SLOPE_NOISE;
 use crate::tracking::lamp_search::find_lamp;
 use crate::tracking::shading_correction::correct_once;
 use crate::uncertainty::observability::UnobservableParameter;
@@ -31,9 +31,8 @@ const MAX_LEARNING_SOLVES: usize = 4;
 /// A parameter that the last solve finds unobservable is fixed, and the solve planned again; as it
 /// is if the shape turns out to have other strengths ([`crate::stages::shape`]), or if residuals
 /// show model errors, with pixels that tell accordingly less ([`crate::uncertainty::model_error`]).
-/// On a wall so faint that steps in fine pixels are mostly noise, the last solve takes coarser ones
-/// ([`crate::uncertainty::observed_curvature`]), and is repeated in finer ones if it was the
-/// distance from the solution that made them so.
+/// On a wall so faint that slopes between fine pixels are mostly noise, the last solve may take
+/// coarser ones, and be repeated in finer ones that tell more at its end.
 ///
 /// # Errors
 /// A frame that cannot be read, equations without a solution.
@@ -117,8 +116,8 @@ pub fn run<'a>(
     Ok(estimation)
 }
 
-/// Sets up the problem, and its level: if steps in fine pixels would be mostly noise, that at which
-/// pixels tell most. None if it was to be joint and the wall is too smooth for that.
+/// Sets up the problem, and its level: if slopes between fine pixels are mostly noise, that at
+/// which pixels tell most. None if it was to be joint and the wall is too smooth for that.
 fn problem_of<'a>(
     plan: &SolvePlan,
     setup: &Setup,
@@ -139,8 +138,8 @@ fn problem_of<'a>(
     if joint || !variance_weighting {
         return Ok(Some((level, problem)));
     }
-    let (mut level, mut observed) = (level, observe_curvature_at_start(&problem)?);
-    while observed.scatter > MAX_CURVATURE_SCATTER && level < setup.coarsest_level() {
+    let mut level = level;
+    while problem.slope_noise() > MAX_SLOPE_NOISE && level < setup.coarsest_level() {
         let sampling = Sampling {
             level: level + 1,
             ..plan.sampling
@@ -148,11 +147,11 @@ fn problem_of<'a>(
         let Some(coarser) = problem_at(sampling, setup, context, state)? else {
             break;
         };
-        let of_coarser = observe_curvature_at_start(&coarser)?;
-        if of_coarser.information <= observed.information {
+        let [here, there] = [&problem, &coarser].map(observe_at_start);
+        if there?.information <= here?.information {
             break;
         }
-        (level, problem, observed) = (level + 1, coarser, of_coarser);
+        (level, problem) = (level + 1, coarser);
     }
     Ok(Some((level, problem)))
 }
@@ -180,9 +179,7 @@ fn problem_at<'a>(
 }
 
 /// Observes the curvature where the last solve starts.
-fn observe_curvature_at_start(
-    problem: &PhotometricProblem,
-) -> Result<ObservedCurvature, ProblemError> {
+fn observe_at_start(problem: &PhotometricProblem) -> Result<ObservedCurvature, ProblemError> {
     let start = problem.initial_linearisation().and_then(|at| {
         let factor = problem.symbolic().factorise(&at.normal, 0.0);
         Some((at, factor.ok()?))
@@ -194,8 +191,8 @@ fn observe_curvature_at_start(
     observe_curvature(problem, at_start, &factor, &problem.signed_scores(at))
 }
 
-/// True if finer pixels than those of a solve tell more at its end: at its beginning frames, lens or
-/// wall may have been too far off for that.
+/// True if finer pixels than those of a solve tell more at its end: at its beginning frames, lens
+/// or wall may have been too far off for that.
 fn is_close_for_finer(
     plan: &SolvePlan,
     setup: &Setup,

@@ -124,10 +124,34 @@ impl TextureSpectrum {
             (1.0 - noise / self.squares[l][k].max(f64::MIN_POSITIVE)).max(0.0) as f32
         };
         Denoiser {
+            slope_noise: self.slope_noise(&noise),
             basis: self.basis.map(|p| p.map(|v| v as f32)),
             transposed: std::array::from_fn(|i| std::array::from_fn(|k| self.basis[k][i] as f32)),
             factors: std::array::from_fn(|l| std::array::from_fn(|k| factor(l, k))),
         }
+    }
+
+    /// Share of the noise in the energy of the slopes of the filtered texture, 0 to 1; `noise`:
+    /// `s_kl`.
+    ///
+    /// `Σ λ_kl W_kl² n_kl / Σ λ_kl W_kl² m_kl`, with the energy `λ_kl` of the slopes of `p_k p_l`.
+    fn slope_noise(&self, noise: &Square<f64>) -> f64 {
+        let energy = self.basis.map(|p| -> f64 {
+            let steps = p.iter().zip(&p[1..]).map(|(from, to)| (to - from).powi(2));
+            steps.sum()
+        });
+        let (mut of_noise, mut of_all) = (0.0, 0.0);
+        for (l, (noise, squares)) in noise.iter().zip(&self.squares).enumerate() {
+            for (k, (noise, square)) in noise.iter().zip(squares).enumerate() {
+                let noise = self.noise_gain * noise;
+                let filter = (1.0 - noise / square.max(f64::MIN_POSITIVE)).max(0.0);
+                let weight = (energy[k] + energy[l]) * filter.powi(2);
+                of_noise += weight * noise;
+                of_all += weight * square;
+            }
+        }
+        // A texture of which nothing passes is all noise.
+        if of_all > 0.0 { of_noise / of_all } else { 1.0 }
     }
 
     /// `s_kl`, l the row: means over the residuals whose energy `Σ ρ²` is not beyond
@@ -158,6 +182,8 @@ impl TextureSpectrum {
 /// Wiener filter of a tile.
 #[derive(Clone, Debug)]
 pub struct Denoiser {
+    /// Share of the noise in the energy of the slopes of filtered textures, 0 to 1.
+    pub slope_noise: f64,
     /// `p_k(i)`, k the row.
     basis: Square<f32>,
     /// `p_k(i)`, k the column.
