@@ -36,17 +36,13 @@ fn without_its_mask(survey: &Path) {
 /// Refines a survey with its wall as given: what may hide in a deformation that is not seen varies
 /// by more than a mask costs. Returns `refine.json` and the error on the wall, pixels.
 fn refined(survey: &Path) -> (Value, f64) {
+    refined_with(survey, &["--shape", "fixed"])
+}
+
+fn refined_with(survey: &Path, options: &[&str]) -> (Value, f64) {
     let out = survey.join("refined");
-    let json = succeed(&[
-        "refine",
-        text(survey),
-        "--out",
-        text(&out),
-        "--shape",
-        "fixed",
-        "--json",
-        "--quiet",
-    ]);
+    let refine = ["refine", text(survey), "--out", text(&out)];
+    let json = succeed(&[&refine, options, &["--json", "--quiet"]].concat());
     let error_px = wall_px(survey, &out.join("poses.tum"));
     (serde_json::from_str(&json).unwrap(), error_px)
 }
@@ -360,7 +356,7 @@ fn water_that_mirrors_is_left_out_as_a_band() {
         let mirrored = image::open(&other.frames[k].path).unwrap().to_luma8();
         move |[u, v], _| Some(mirrored.get_pixel(u, v).0[0])
     });
-    let (report, _) = refined(&dry);
+    let (report, _) = refined_with(&dry, &[]);
     let bands = report["hidden_bands"].as_array().unwrap();
     let [band] = &bands[..] else {
         panic!("{bands:?}")
@@ -373,10 +369,13 @@ fn water_that_mirrors_is_left_out_as_a_band() {
     let frames = report["frames"].as_array().unwrap();
     let is_sure = |k: &usize| frames[*k]["flag"] == "photometric";
     let sure: Vec<usize> = (0..frames.len()).filter(is_sure).collect();
-    // 28 to 34 of 36, as rounding has it: a nanometre in an initial pose decides about some.
-    assert!(sure.len() >= 27, "{}", sure.len());
+    assert!(sure.len() >= 30, "{}", sure.len());
     let of = |poses: &[Pose]| -> Vec<Pose> { sure.iter().map(|k| poses[*k]).collect() };
     let (poses, truth) = (of(&poses), of(&truth));
     let error = wall_error(survey.surface.as_ref(), &survey.cameras, &poses, &truth).unwrap();
-    assert!(error.px.rms < 0.2, "{:?}", error.px);
+    // The wall's shape is estimated, too, so the whole may bend a little: within its σ.
+    let square = |k: &usize| frames[*k]["sigma"]["wall_px"].as_f64().unwrap().powi(2);
+    let variance_px2 = sure.iter().map(square).sum::<f64>() / sure.len() as f64;
+    assert!(error.px.rms < 3.0 * variance_px2.sqrt(), "{:?}", error.px);
+    assert!(error.px.rms < 0.5, "{:?}", error.px);
 }
