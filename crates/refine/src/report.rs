@@ -105,6 +105,13 @@ pub struct LevelReport {
     pub solve: SolveRecord,
 }
 
+impl LevelReport {
+    /// Size of the pixels, in pixels of full size.
+    pub fn pixel_px(&self) -> usize {
+        1 << self.level
+    }
+}
+
 /// Wall-clock time of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]

@@ -52,10 +52,10 @@ fn print_solves(report: &RefineReport, terminal: &Terminal) {
             solve.cost_end,
             solve.observations,
             solve.sigma,
-            match (level.joint, level.level) {
+            match (level.joint, level.pixel_px()) {
                 (true, _) => "  jointly with the wall".to_owned(),
-                (false, 0) => String::new(),
-                (false, level) => format!("  pixels of size {}", 1 << level),
+                (false, 1) => String::new(),
+                (false, size) => format!("  pixels of size {size}"),
             }
         ));
     }

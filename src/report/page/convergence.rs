@@ -34,11 +34,11 @@ pub fn section(data: &PageData) -> Option<Markup> {
     })
 }
 
-/// Name of a solve: density of samples, and whether the wall is solved for.
+/// Name of a solve: density of samples, size of pixels, and whether the wall is solved for.
 fn name(level: &LevelReport) -> String {
     let mut name = format!("{} samples per px", level.samples_per_pixel);
     if level.level > 0 {
-        name += &format!(" of size 1/{}", 1 << level.level);
+        name += &format!(" of size {}", level.pixel_px());
     }
     if level.joint {
         name += ", jointly with the wall";

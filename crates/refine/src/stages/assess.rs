@@ -45,9 +45,7 @@ pub fn run<'a>(
         stopping,
     } = last;
     let sigmas = frame_sigmas(&context, &state.frames, &uncertainty);
-    let mut rejections = state.frames.rejections.clone();
-    judge(setup, &solution, &sigmas, &mut rejections);
-    state.frames.rejections.clone_from(&rejections);
+    judge(setup, &solution, &sigmas, &mut state.frames.rejections);
     let calibration = setup.calibration_at(state);
     let datum = calibration.datum(&context.kappa);
     let held = setup.wall.as_ref().filter(|_| state.shape.is_none());
@@ -68,7 +66,7 @@ pub fn run<'a>(
         &datum,
         (&state.frames.estimates, shape),
         &uncertainty.covariances,
-        rejections,
+        state.frames.rejections.clone(),
     );
     session.progress.finish();
     session.record_time("covariance");

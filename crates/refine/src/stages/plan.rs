@@ -144,7 +144,7 @@ impl SolvePlan {
         } = self.sampling;
         let size = match level {
             0 => String::new(),
-            level => format!(" of size 1/{}", 1 << level),
+            level => format!(" of size {}", 1 << level),
         };
         match (joint, density) {
             (true, _) => "solve, jointly with the wall".to_owned(),

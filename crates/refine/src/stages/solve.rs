@@ -19,7 +19,7 @@ use crate::thresholds::last_solve::MAX_SLOPE_NOISE;
 use crate::tracking::lamp_search::find_lamp;
 use crate::tracking::shading_correction::correct_once;
 use crate::uncertainty::observability::UnobservableParameter;
-use crate::uncertainty::observed_curvature::{ObservedCurvature, observe_curvature};
+use crate::uncertainty::observed_curvature::observe_curvature;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::validation::disagreement::reject_disagreeing_frames;
 
@@ -138,7 +138,7 @@ fn problem_of<'a>(
     if joint || !variance_weighting {
         return Ok(Some((level, problem)));
     }
-    let mut level = level;
+    let (mut level, mut information) = (level, None);
     while problem.slope_noise() > MAX_SLOPE_NOISE && level < setup.coarsest_level() {
         let sampling = Sampling {
             level: level + 1,
@@ -147,11 +147,12 @@ fn problem_of<'a>(
         let Some(coarser) = problem_at(sampling, setup, context, state)? else {
             break;
         };
-        let [here, there] = [&problem, &coarser].map(observe_at_start);
-        if there?.information <= here?.information {
+        let here = information.map_or_else(|| information_at_start(&problem), Ok)?;
+        let there = information_at_start(&coarser)?;
+        if there <= here {
             break;
         }
-        (level, problem) = (level + 1, coarser);
+        (level, problem, information) = (level + 1, coarser, Some(there));
     }
     Ok(Some((level, problem)))
 }
@@ -178,17 +179,18 @@ fn problem_at<'a>(
     problem.exclude_outliers(density).map(Some)
 }
 
-/// Observes the curvature where the last solve starts.
-fn observe_at_start(problem: &PhotometricProblem) -> Result<ObservedCurvature, ProblemError> {
+/// Information about the poses where the last solve starts; 0 if it is not known there.
+fn information_at_start(problem: &PhotometricProblem) -> Result<f64, ProblemError> {
     let start = problem.initial_linearisation().and_then(|at| {
         let factor = problem.symbolic().factorise(&at.normal, 0.0);
         Some((at, factor.ok()?))
     });
     let Some((at, factor)) = start else {
-        return Ok(ObservedCurvature::AS_PREDICTED);
+        return Ok(0.0);
     };
     let at_start = (at, &problem.initial_unknowns());
-    observe_curvature(problem, at_start, &factor, &problem.signed_scores(at))
+    let observed = observe_curvature(problem, at_start, &factor, &problem.signed_scores(at))?;
+    Ok(observed.information())
 }
 
 /// True if finer pixels than those of a solve tell more at its end: at its beginning frames, lens

@@ -55,9 +55,8 @@ pub struct ObservedCurvature {
     pub mean: f64,
     /// 1-σ η of its deviations from κ, over κ: root mean square over all directions.
     pub scatter: f64,
-    /// Information of the pixels about the pose of a frame if those of all others are known:
-    /// inverse variance, the geometric mean over frames and their unknowns.
-    pub information: f64,
+    /// Information about the pose of a frame, if the score changed as predicted.
+    predicted_information: f64,
 }
 
 impl ObservedCurvature {
@@ -65,19 +64,25 @@ impl ObservedCurvature {
     pub const AS_PREDICTED: Self = Self {
         mean: 1.0,
         scatter: 0.0,
-        information: 0.0,
+        predicted_information: 0.0,
     };
 
     /// The derivative of a score that does not change.
     const NONE: Self = Self {
         mean: NO_CURVATURE,
         scatter: 0.0,
-        information: 0.0,
+        predicted_information: 0.0,
     };
 
     /// The derivative without scatter by which the variance of the estimate is the same.
     pub fn effective(&self) -> f64 {
         self.mean / (1.0 + self.scatter.powi(2)).sqrt()
+    }
+
+    /// Information of the pixels about the pose of a frame if those of all others are known:
+    /// inverse variance, the geometric mean over frames and their unknowns.
+    pub fn information(&self) -> f64 {
+        self.predicted_information * self.effective().powi(2)
     }
 }
 
@@ -118,14 +123,10 @@ pub fn observe_curvature(
     }
     let square = -dot(&factor.step(&beyond), &beyond) / stride.unwrap_or(1) as f64;
     let dispersion = -dot(&step[..frames], scores) / (POSE * frames) as f64;
-    let curvature = ObservedCurvature {
+    Ok(ObservedCurvature {
         mean: mean.min(1.0),
         scatter: (square / (mean.powi(2) * along(&expected))).sqrt(),
-        information: of_frames / dispersion,
-    };
-    Ok(ObservedCurvature {
-        information: curvature.information * curvature.effective().powi(2),
-        ..curvature
+        predicted_information: of_frames / dispersion,
     })
 }
 
@@ -223,7 +224,7 @@ mod tests {
         let observed = ObservedCurvature {
             mean: 0.9,
             scatter: 0.5,
-            information: 1.0,
+            predicted_information: 1.0,
         };
         let expected = 0.9 / 1.25f64.sqrt();
         assert!((observed.effective() - expected).abs() < 1e-12);
