@@ -14,10 +14,9 @@ use crate::tracking::prescreening::is_featureless;
 use crate::tracking::track::Tracking;
 use std::sync::Arc;
 use tunnelstitch_core::frames::{
-    FrameCache, FrameSet, GreyImage, Pyramid, StoredFrame, noise_sigma, normalise_locally,
+    FrameCache, FrameSet, GreyImage, PictureNoise, Pyramid, StoredFrame, normalise_locally,
 };
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::numerics::median::upper_median;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::trajectory::Pose;
 
@@ -39,7 +38,7 @@ pub struct LiveTracking {
     empty: Arc<Pyramid>,
     tracking: Tracking,
     /// 1-σ of the noise of the first frames, grey levels.
-    noises: Vec<f64>,
+    noises: Vec<PictureNoise>,
     skipped: usize,
 }
 
@@ -167,7 +166,7 @@ impl LiveTracking {
             &options,
         )?;
         setup.frames = FrameCache::of_pyramids(self.pyramids.iter().cloned());
-        let noise = upper_median(self.noises.clone()).unwrap_or(0.0);
+        let noise = PictureNoise::median(&self.noises);
         let context = EstimationContext {
             prior: &setup.tracking_prior,
             ..setup.initial_context(noise)
@@ -188,7 +187,7 @@ impl LiveTracking {
                 .as_ref()
                 .filter(|_| self.noises.len() < NOISE_FRAMES)
             {
-                self.noises.extend(noise_sigma(pyramid.level(0)));
+                self.noises.extend(PictureNoise::of(pyramid));
             }
             let kept = pyramid.map_or_else(|| Arc::clone(&self.empty), Arc::new);
             self.pyramids.push(kept);

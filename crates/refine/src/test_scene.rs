@@ -7,7 +7,7 @@ use crate::parameters::calibration::{Calibration, Kappa};
 use crate::samples::visibility::PosedFrame;
 use crate::tiles::grid::WallGrid;
 use std::sync::LazyLock;
-use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
+use tunnelstitch_core::frames::{FrameCache, GreyImage, PictureNoise, Pyramid};
 use tunnelstitch_core::test_wall::{TestWall, waves};
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::surface::{Circle, Footprint, GaugeMotion, WallPoint, WallRegions};
@@ -112,7 +112,7 @@ pub fn test_context<'a>(
         frames,
         prior,
         dispersion: 1.0,
-        noise: 0.0,
+        noise: PictureNoise::default(),
     }
 }
 

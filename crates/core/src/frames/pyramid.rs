@@ -25,6 +25,11 @@ impl Pyramid {
         }
     }
 
+    /// Number of levels.
+    pub fn levels(&self) -> usize {
+        self.contrasts.len()
+    }
+
     /// The image at `level`; 0 is full resolution.
     ///
     /// # Panics

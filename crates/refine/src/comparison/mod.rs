@@ -14,4 +14,5 @@ pub mod mosaic_grid;
 pub mod ncc_score;
 pub mod overlaps;
 pub mod pairwise_ncc;
+pub mod unexplained;
 pub mod unwrapped_frame;

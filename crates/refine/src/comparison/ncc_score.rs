@@ -28,7 +28,7 @@ impl NccScore {
         self.noise_y += f64::from(noise_y);
     }
 
-    /// The normalised cross-correlation, −1 to 1, noise included.
+    /// The normalised cross-correlation c, −1 to 1, noise included.
     pub fn correlation(&self) -> f64 {
         self.xy / (self.xx * self.yy).sqrt().max(f64::MIN_POSITIVE)
     }

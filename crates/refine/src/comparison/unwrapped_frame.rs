@@ -5,9 +5,7 @@ use crate::model::problem_error::ProblemError;
 use crate::samples::point_sampler::{ImagePoint, PointSampler};
 use nalgebra::Vector3;
 use std::sync::Arc;
-use tunnelstitch_core::frames::{
-    GreyImage, LocalContrast, Pyramid, local_contrast, mask_outliers, noise_at_level,
-};
+use tunnelstitch_core::frames::{GreyImage, LocalContrast, Pyramid, local_contrast, mask_outliers};
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::trajectory::Pose;
 
@@ -86,7 +84,7 @@ impl UnwrappedFrame {
         UnwrappedSampler {
             unwrapped: self,
             sampler: PointSampler::new(&self.camera, pose, origin),
-            variance: (context.noise * context.noise * noise_at_level(self.level)) as f32,
+            variance: context.noise.variance_at(self.level) as f32,
         }
     }
 

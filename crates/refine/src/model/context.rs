@@ -8,7 +8,7 @@ use crate::points::observations::PointObservations;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
-use tunnelstitch_core::frames::FrameCache;
+use tunnelstitch_core::frames::{FrameCache, PictureNoise};
 use tunnelstitch_geometry::camera::{Cameras, Sweep};
 use tunnelstitch_geometry::surface::{Gauge, RadialField, Surface, WallRegions, bent, displaced};
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
@@ -44,8 +44,8 @@ pub struct EstimationContext<'a> {
     pub frames: &'a FrameCache,
     /// Prior of poses and exposures.
     pub prior: &'a Prior,
-    /// The sensor's noise, 1-σ in grey levels, estimated from single images.
-    pub noise: f64,
+    /// The noise of the pictures, estimated from single ones.
+    pub noise: PictureNoise,
     /// Factor by which residuals are less informative than noise of their size, 1 or more: the
     /// dispersion of [`crate::uncertainty::model_error`], once it is known. The information of
     /// pixels is divided by it.

@@ -66,8 +66,7 @@ impl PhotometricProblem<'_> {
         // estimate, but mistake fine texture for noise.
         let interpolation = self.sampling.interpolation;
         let axis = interpolation.autocorrelation(0.0);
-        let single = self.context.noise.powi(2)
-            * noise_at_level(self.sampling.level)
+        let single = self.context.noise.variance_at(self.sampling.level)
             * match interpolation {
                 Interpolation::Bilinear => 1.0,
                 // Neighbours of coarser levels are taken to go together in either interpolation.

@@ -12,7 +12,9 @@ use crate::tracking::neighbour_pairs::register_pairs;
 use crate::tracking::prescreening::{Prescreened, prescreen};
 use crate::tracking::registration::Registered;
 use image::DynamicImage;
-use tunnelstitch_core::frames::{FrameCache, FrameSet, Light, PictureOrientation, load_colour};
+use tunnelstitch_core::frames::{
+    FrameCache, FrameSet, Light, PictureNoise, PictureOrientation, load_colour,
+};
 use tunnelstitch_core::progress::Silent;
 use tunnelstitch_core::survey::{PoseReading, Survey};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -109,7 +111,11 @@ impl<'s> PicturePairs<'s> {
         let setup = self.setup(&files, reading, initial, options)?;
         // No light is known yet.
         setup.frames.set_light(Light::Normalised);
-        let prescreened = prescreen(&setup.initial_context(0.0), setup.coarsest_level(), &Silent)?;
+        let prescreened = prescreen(
+            &setup.initial_context(PictureNoise::default()),
+            setup.coarsest_level(),
+            &Silent,
+        )?;
         Ok(TurnedPictures {
             orientation: reading.orientation,
             cache: setup.frames,

@@ -28,7 +28,7 @@ use crate::stages::state::{GlobalSolve, PipelineState, Snapshot};
 use crate::uncertainty::observability::UnobservableParameter;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use tunnelstitch_core::frames::Light;
+use tunnelstitch_core::frames::{Light, PictureNoise};
 use tunnelstitch_core::persist::checkpoint::Checkpoint;
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_geometry::surface::{SplineLattice, WallPoint};
@@ -142,9 +142,8 @@ fn joined_snapshot(
         tested,
     } = join_unknowns(&pairs);
     let states = || ended.iter().map(Ended::state);
-    let count = ended.len() as f64;
     let mut state = PipelineState {
-        noise: states().map(|state| state.noise).sum::<f64>() / count,
+        noise: PictureNoise::median(&states().map(|state| state.noise).collect::<Vec<_>>()),
         is_lamp_ruled_out: states().any(|state| state.is_lamp_ruled_out),
         frames: frames.states.clone(),
         kappa: Kappa::zeros(),
@@ -201,7 +200,7 @@ fn joined_wall(
     ended: &[Ended],
     state: &PipelineState,
 ) -> Result<(Option<Shape>, UnseenErrors), RefineError> {
-    let context = setup.initial_context(0.0);
+    let context = setup.initial_context(PictureNoise::default());
     let walls = [setup.input.surface.as_ref(); 2];
     let of_wall = ended.iter().filter_map(|ended| {
         let shape = ended.state().shape.as_ref()?;

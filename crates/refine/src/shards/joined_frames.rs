@@ -11,6 +11,7 @@ use crate::shards::state::StraightShard;
 use crate::stages::setup::Setup;
 use crate::tracking::pose_separation::separation_px;
 use std::ops::Range;
+use tunnelstitch_core::frames::PictureNoise;
 use tunnelstitch_geometry::numerics::median::upper_median;
 use tunnelstitch_geometry::surface::GaugeMotion;
 
@@ -81,7 +82,7 @@ fn align(
     [(before, states_before), (shard, states)]: [(&Shard, &FrameStates); 2],
     displaced: &mut Vec<(usize, RejectionReason)>,
 ) -> Result<ShardAlignment, RefineError> {
-    let context = setup.initial_context(0.0);
+    let context = setup.initial_context(PictureNoise::default());
     let gauge = context.gauge();
     let frames = middle_half(shard.frames.start..before.frames.end);
     let firsts = [before.frames.start, shard.frames.start];

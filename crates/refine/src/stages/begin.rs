@@ -6,6 +6,7 @@ use crate::parameters::unseen_errors::UnseenErrors;
 use crate::stages::plan::plan_stages;
 use crate::stages::setup::Setup;
 use crate::stages::state::PipelineState;
+use tunnelstitch_core::frames::PictureNoise;
 
 /// The state before the first stage.
 pub fn begin(setup: &Setup) -> PipelineState {
@@ -17,7 +18,7 @@ pub fn begin(setup: &Setup) -> PipelineState {
     PipelineState {
         stages: plan_stages(setup.options),
         over: Vec::new(),
-        noise: 0.0,
+        noise: PictureNoise::default(),
         has_common_light: true,
         is_lamp_ruled_out: false,
         dispersion: 1.0,

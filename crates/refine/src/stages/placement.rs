@@ -25,7 +25,7 @@ use crate::verdict::rig_report::MountReport;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use nalgebra::{Matrix6, Vector3};
 use std::sync::Arc;
-use tunnelstitch_core::frames::Light;
+use tunnelstitch_core::frames::{Light, PictureNoise};
 use tunnelstitch_core::survey::MaskedWall;
 use tunnelstitch_geometry::surface::{Bend, GaugeMotion, Surface, WallPoint, bent};
 use tunnelstitch_geometry::trajectory::{Pose, Rig, StampedPose, Trajectory, poses_of};
@@ -86,7 +86,7 @@ impl Placement {
     ) -> Self {
         let prior = &setup.prior;
         let mut photometric: Vec<bool> = rejections.iter().map(Option::is_none).collect();
-        let gauge = setup.initial_context(0.0).gauge();
+        let gauge = setup.initial_context(PictureNoise::default()).gauge();
         let motion = prior.align_gauge(&gauge, estimates, datum, &photometric);
         let planned = &setup.input.surface;
         let before = bent(planned, datum.bend);

@@ -18,7 +18,7 @@ use crate::samples::footprints::{extent_h_m, footprints};
 use crate::stages::state::PipelineState;
 use crate::thresholds::tracking::REGISTERED_SHARE;
 use std::sync::Arc;
-use tunnelstitch_core::frames::FrameCache;
+use tunnelstitch_core::frames::{FrameCache, PictureNoise};
 use tunnelstitch_core::survey::{CalibrationGroup, DEFAULT_SHAPE_SIGMA_RADII};
 use tunnelstitch_geometry::surface::{RadialField, bent, displaced};
 use tunnelstitch_geometry::trajectory::{Jitter, Pose, Rig};
@@ -125,7 +125,10 @@ impl<'a> Setup<'a> {
             }
         }
         let frames = FrameStates::at(&self.prior.initial, vec![None; self.count()]);
-        let [from, to] = extent_h_m(&footprints(&self.initial_context(0.0), &frames)?);
+        let [from, to] = extent_h_m(&footprints(
+            &self.initial_context(PictureNoise::default()),
+            &frames,
+        )?);
         let radius_m = self.input.nominal_radius_m;
         let wall = PointFit {
             points,
@@ -185,9 +188,8 @@ impl<'a> Setup<'a> {
         }
     }
 
-    /// The estimation context before anything is estimated, with the sensor's noise of 1-σ `noise`
-    /// grey levels.
-    pub fn initial_context(&self, noise: f64) -> EstimationContext<'_> {
+    /// The estimation context before anything is estimated, with pictures of this `noise`.
+    pub fn initial_context(&self, noise: PictureNoise) -> EstimationContext<'_> {
         let planned = Arc::clone(&self.input.surface);
         let displacement = self.held_displacement.as_ref();
         EstimationContext {

@@ -15,7 +15,7 @@ use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
-use tunnelstitch_core::frames::Light;
+use tunnelstitch_core::frames::{Light, PictureNoise};
 
 /// The part of a refinement's state that a checkpoint keeps.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -24,8 +24,8 @@ pub struct PipelineState {
     pub stages: VecDeque<Stage>,
     /// Stages that are over.
     pub over: Vec<Stage>,
-    /// 1-σ of the sensor's noise, grey levels.
-    pub noise: f64,
+    /// The noise of the pictures.
+    pub noise: PictureNoise,
     /// False if the light has turned out to be no shading that all frames have in common.
     pub has_common_light: bool,
     /// True if most frames did not fit in the light of a lamp.

@@ -143,7 +143,8 @@ impl TileWorkspace {
         let covered = self.covered();
         let mut phi = features(&texture, slopes, &covered);
         if let Some(denoiser) = denoiser {
-            let denoised = features(&denoiser.apply(&texture), slopes, &covered);
+            let clean = denoiser.apply(&texture, self.noise_gain());
+            let denoised = features(&clean, slopes, &covered);
             (phi[0], phi[1]) = (denoised[0], denoised[1]);
         }
         let mut variance = ZERO_ROWS;

@@ -100,6 +100,19 @@ impl TileWorkspace {
         }
     }
 
+    /// Variance of the noise of S over that of a frame ([`crate::tiles::denoising`]).
+    #[inline(always)]
+    pub fn noise_gain(&self) -> f32 {
+        let (mut total, mut square) = (0.0f32, 0.0f32);
+        for frame in &self.frames {
+            // w/a = q a.
+            let weight = frame.pixels * frame.gain;
+            total += weight * frame.gain;
+            square += weight * weight;
+        }
+        square / (total * total).max(f32::MIN_POSITIVE)
+    }
+
     /// Values, gain and share of the weight of each observer ([`crate::tiles::denoising`]).
     fn shares(&self) -> impl Iterator<Item = TileFrame<'_>> {
         let weight = |frame: &FrameValues| f64::from(frame.pixels * frame.gain * frame.gain);

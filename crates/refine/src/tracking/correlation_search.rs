@@ -71,8 +71,22 @@ pub fn min_samples(unwrapped: &UnwrappedFrame) -> f64 {
     MIN_OVERLAP_SHARE * f64::from(camera.width) * f64::from(camera.height)
 }
 
+/// Log-likelihood that the greatest of so many correlations of noise exceeds with the probability
+/// `alpha`: `ℓ ≈ ½ z²` of a normal deviate z, which exceeds z with a probability below `exp(−½ z²)`.
+pub fn log_likelihood_by_chance(correlations: usize, alpha: f64) -> f64 {
+    (correlations as f64 / alpha).ln()
+}
+
+/// The result of a search.
+pub struct Found {
+    /// Hypotheses, best first.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Number of maxima of the correlation that they are the best of.
+    pub maxima: usize,
+}
+
 /// Searches around `predicted`, with the prior's σ of pitch, yaw and roll as they appear in the
-/// picture, `sigma_rad`; returns at most `count` hypotheses, best first.
+/// picture, `sigma_rad`, for at most `count` hypotheses.
 pub fn search_poses(
     context: &EstimationContext,
     mosaic: &ReferenceMosaic,
@@ -80,11 +94,14 @@ pub fn search_poses(
     predicted: &Pose,
     sigma_rad: [f64; 3],
     count: usize,
-) -> Vec<Hypothesis> {
+) -> Found {
     let spacing_m = mosaic.grid.spacing_m;
     let Some(grid) = search_grid(context, unwrapped.camera(), predicted, sigma_rad, spacing_m)
     else {
-        return Vec::new();
+        return Found {
+            hypotheses: Vec::new(),
+            maxima: 0,
+        };
     };
     let cells = |length_m: f64| (length_m / spacing_m).ceil() as usize;
     let correlator = Correlator::new(mosaic, grid.reach_m().map(cells).into());
@@ -102,16 +119,18 @@ pub fn search_poses(
         })
         .collect();
     maxima.sort_by(|a, b| b.score.total_cmp(&a.score));
-    select_distinct(grid.as_ref(), &maxima, spacing_m, count)
-        .into_iter()
-        .filter_map(|maximum| {
-            Some(Hypothesis {
-                pose: grid.shifted_pose(maximum.turns, &maximum.shift_m)?,
-                score: maximum.score,
-                attainable_score: maximum.attainable_score,
-            })
+    let best = select_distinct(grid.as_ref(), &maxima, spacing_m, count).into_iter();
+    let hypotheses = best.filter_map(|maximum| {
+        Some(Hypothesis {
+            pose: grid.shifted_pose(maximum.turns, &maximum.shift_m)?,
+            score: maximum.score,
+            attainable_score: maximum.attainable_score,
         })
-        .collect()
+    });
+    Found {
+        hypotheses: hypotheses.collect(),
+        maxima: maxima.len(),
+    }
 }
 
 /// The grid around a pose for samples `spacing_m` apart; None if the camera sees no wall.

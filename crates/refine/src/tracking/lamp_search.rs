@@ -11,15 +11,14 @@ use crate::options::RefineOptions;
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::light_model::LightModel;
 use crate::tracking::tile_views::{TileViews, calibrated_frames};
-use tunnelstitch_core::frames::{LAMP_TERMS, Lamp, Light, noise_sigma};
-use tunnelstitch_geometry::numerics::median::upper_median;
+use tunnelstitch_core::frames::{LAMP_TERMS, Lamp, Light, PictureNoise};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::mean_radius_m;
 use tunnelstitch_photometry::PhotometricCalibration;
 
 /// Looks for a lamp that moves with the camera, at the frames' present poses, and takes it over if
 /// frames agree better with one beside a shading than with a shading alone, by more than chance,
-/// and to less than the noise of a pixel. Returns that noise, 1-σ in grey levels; None if there is
+/// and to less than the noise of a pixel. Returns that noise; None if there is
 /// no lamp.
 ///
 /// # Errors
@@ -28,7 +27,7 @@ pub fn find_lamp(
     context: &EstimationContext,
     options: &RefineOptions,
     frames: &FrameStates,
-) -> Result<Option<f64>, ProblemError> {
+) -> Result<Option<PictureNoise>, ProblemError> {
     let before = context.frames.light();
     let is_normalised = matches!(before, Light::Normalised);
     let dark = LightModel::present(context);
@@ -42,7 +41,7 @@ pub fn find_lamp(
     };
     let noise = median_noise(context)?;
     let lamp = lamp_beside(dark, &views, context, options);
-    match lamp.filter(|(_, found)| found.variance.sqrt() < noise) {
+    match lamp.filter(|(_, found)| found.variance.sqrt() < noise.fine) {
         Some((light, _)) => {
             light.take_over(context, &frames.estimates);
             Ok(Some(noise))
@@ -79,12 +78,14 @@ fn lamp_beside(
     (gain > least).then_some(lit)
 }
 
-/// Median noise of the frames that the light is estimated from, 1-σ in grey levels.
-fn median_noise(context: &EstimationContext) -> Result<f64, ProblemError> {
+/// Median noise of the frames that the light is estimated from.
+fn median_noise(context: &EstimationContext) -> Result<PictureNoise, ProblemError> {
     let frames: Vec<usize> = calibrated_frames(context.frames.frames()).collect();
-    let noises = frames.par_map(|k| Ok(noise_sigma(context.frames.get(*k)?.level(0))));
-    let noises: Vec<Option<f64>> = noises.into_iter().collect::<Result<_, ProblemError>>()?;
-    Ok(upper_median(noises.into_iter().flatten().collect()).unwrap_or_default())
+    let noises = frames.par_map(|k| Ok(PictureNoise::of(&*context.frames.get(*k)?)));
+    let noises: Vec<Option<PictureNoise>> =
+        noises.into_iter().collect::<Result<_, ProblemError>>()?;
+    let noises: Vec<PictureNoise> = noises.into_iter().flatten().collect();
+    Ok(PictureNoise::median(&noises))
 }
 
 #[cfg(test)]
@@ -144,7 +145,7 @@ mod tests {
         }
         frames.set_light(before);
         let noise = find_lamp(&context, &RefineOptions::default(), &states).unwrap()?;
-        assert!((noise - 1.0).abs() < 0.3, "{noise}");
+        assert!((noise.fine - 1.0).abs() < 0.3, "{noise:?}");
         frames.lamp_m().map(Vector3::from)
     }
 

@@ -1,12 +1,12 @@
 //! Prescreening: rejects frames that show nothing or repeat an earlier picture, and finds the mean
-//! of the others and the sensor's noise.
+//! of the others and the noise of the pictures.
 
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::thresholds::correlation_search::MIN_OVERLAP_SHARE;
 use crate::thresholds::prescreening::{MAX_REPEAT_DIFFERENCE_GREY, MIN_CONTRAST_GREY};
-use tunnelstitch_core::frames::{GreyImage, noise_sigma};
+use tunnelstitch_core::frames::{GreyImage, PictureNoise};
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::viewing_distance;
@@ -23,8 +23,8 @@ pub struct Prescreened {
     /// The mean of all frames at the coarsest level, each over its own mean, in hundredths; None
     /// if they are too few to show the light.
     pub mean: Option<GreyImage>,
-    /// 1-σ of the sensor's noise, grey levels: the median over the frames.
-    pub noise: f64,
+    /// The noise of the pictures: the median over the frames.
+    pub noise: PictureNoise,
 }
 
 /// Prescreens every frame at the coarsest pyramid level.
@@ -50,10 +50,10 @@ pub fn prescreen(
             .par_map(|k| {
                 let frame = context.frames.get(k)?;
                 progress.advance(1);
-                Ok((frame.level(coarsest).clone(), noise_sigma(frame.level(0))))
+                Ok((frame.level(coarsest).clone(), PictureNoise::of(&frame)))
             })
             .into_iter()
-            .collect::<Result<Vec<(GreyImage, Option<f64>)>, ProblemError>>()?;
+            .collect::<Result<Vec<(GreyImage, Option<PictureNoise>)>, ProblemError>>()?;
         for (k, (picture, noise)) in (start..).zip(pictures) {
             size = (picture.width(), picture.height());
             sums.resize(size.0 * size.1, [0.0; 2]);
@@ -85,9 +85,8 @@ pub fn prescreen(
     let mean = GreyImage::new(size.0, size.1, mean.collect());
     let has_enough =
         rejections.iter().filter(|reason| reason.is_none()).count() >= MIN_SHADING_FRAMES;
-    noises.sort_unstable_by(f64::total_cmp);
     Ok(Prescreened {
-        noise: noises.get(noises.len() / 2).copied().unwrap_or(0.0),
+        noise: PictureNoise::median(&noises),
         rejections,
         mean: has_enough.then_some(mean),
     })

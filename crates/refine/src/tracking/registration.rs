@@ -5,6 +5,7 @@
 //! ```
 
 use crate::comparison::mosaic_grid::pixel_size_m;
+use crate::comparison::unexplained::Unexplained;
 use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
@@ -15,9 +16,11 @@ use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
-use crate::thresholds::registration::{MAX_HYPOTHESES, MEAN_HYPOTHESES, MIN_UNEXPLAINED};
-use crate::tracking::candidate::{Candidate, choose_candidate, sort_candidates, unexplained_share};
-use crate::tracking::correlation_search::{Hypothesis, log_likelihood, search_poses};
+use crate::thresholds::registration::{MAX_HYPOTHESES, MEAN_HYPOTHESES};
+use crate::tracking::candidate::{Candidate, choose_candidate, sort_candidates};
+use crate::tracking::correlation_search::{
+    Found, Hypothesis, log_likelihood, log_likelihood_by_chance, min_samples, search_poses,
+};
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::PosePrediction;
 use crate::tracking::reference_mosaic::ReferenceMosaic;
@@ -105,8 +108,8 @@ pub fn register_frame(
     };
     let registration =
         Registration::new(context, options, frame, predicted, neighbours, distance_m)?;
-    let hypotheses = registration.search();
-    let mut candidates = registration.refine_hypotheses(&hypotheses, effort)?;
+    let found = registration.search();
+    let mut candidates = registration.refine_hypotheses(&found.hypotheses, effort)?;
     sort_candidates(&mut candidates);
     let camera = context
         .cameras
@@ -116,6 +119,7 @@ pub fn register_frame(
         |candidate: &Candidate| pixel_size_m(context, &camera, &candidate.estimate.pose);
     let chosen = choose_candidate(
         &candidates,
+        log_likelihood_by_chance(found.maxima, options.false_alarm_rate),
         context.surface.as_ref(),
         context.cameras.of(frame),
         pixel_size,
@@ -190,7 +194,7 @@ impl<'r> Registration<'r> {
     }
 
     /// Searches around the predicted pose; see [`search_poses`].
-    fn search(&self) -> Vec<Hypothesis> {
+    fn search(&self) -> Found {
         let (context, predicted) = (self.context, &self.predicted.pose);
         let (mosaic, unwrapped) = (&self.mosaic, &self.unwrapped);
         search_poses(
@@ -241,7 +245,10 @@ impl<'r> Registration<'r> {
         let ncc_score = self
             .mosaic
             .compute_ncc(self.context, &self.unwrapped, &estimate.pose);
-        let Some(unexplained) = unexplained_share(&ncc_score, &self.unwrapped) else {
+        if ncc_score.samples < min_samples(&self.unwrapped) {
+            return Ok(None);
+        }
+        let Some(unexplained) = Unexplained::of(&ncc_score) else {
             return Ok(None);
         };
         let prior = self.context.prior;
@@ -252,8 +259,7 @@ impl<'r> Registration<'r> {
         }
         Ok(Some(Candidate {
             estimate,
-            unexplained: unexplained.max(MIN_UNEXPLAINED),
-            correlation: (1.0 - unexplained).sqrt(),
+            unexplained,
             log_likelihood: log_likelihood(ncc_score.correlation(), ncc_score.samples),
             deviation,
         }))
@@ -267,7 +273,7 @@ impl<'r> Registration<'r> {
         }
         Ok(Registered {
             estimate,
-            is_reliable: candidate.is_reliable(),
+            is_reliable: candidate.unexplained.is_of_right_poses(),
             deviation: candidate.deviation,
             log_likelihood: candidate.log_likelihood,
         })

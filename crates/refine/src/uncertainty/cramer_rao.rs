@@ -59,7 +59,7 @@ use crate::uncertainty::covariance::Covariances;
 use nalgebra::Matrix6;
 use std::borrow::Cow;
 use std::sync::Arc;
-use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
+use tunnelstitch_core::frames::{FrameCache, GreyImage, PictureNoise, Pyramid};
 use tunnelstitch_core::survey::Survey;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::trajectory::{Shutter, poses_of};
@@ -133,7 +133,7 @@ pub fn pose_bounds(
         frames: &frames,
         prior: &prior,
         dispersion: 1.0,
-        noise: 0.0,
+        noise: PictureNoise::default(),
     };
     let frames = FrameStates::at(&poses_of(truth), vec![None; count]);
     let extent_h_m = extent_h_m(&footprints(&flat, &frames)?);

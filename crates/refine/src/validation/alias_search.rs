@@ -1,15 +1,15 @@
 //! Search for aliases: gauge motions after which a frame matches the wall as well as it does now.
 
+use crate::comparison::ncc_score::NccScore;
+use crate::comparison::unexplained::Unexplained;
 use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
-use crate::thresholds::registration::{MAX_UNEXPLAINED_RATIO, MIN_UNEXPLAINED};
-use crate::tracking::candidate::unexplained_share;
 use crate::tracking::correlation_search::{
-    MIN_SEPARATION_SAMPLES, MIN_SQUARED_CORRELATION_LEFT, find_matching_shifts,
+    MIN_SEPARATION_SAMPLES, MIN_SQUARED_CORRELATION_LEFT, find_matching_shifts, min_samples,
 };
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::reference_mosaic::ReferenceMosaic;
@@ -61,21 +61,18 @@ pub fn find_alias_motions(
     let unwrapped = UnwrappedFrame::new(context, level, frame, &sweep)?;
     let target = (frame, &pose);
     let mosaic = ReferenceMosaic::new(context, &unwrapped_frames, &camera, target, margin_m)?;
-    let present = mosaic.compute_ncc(context, &unwrapped, &pose);
-    let Some(present_unexplained) = unexplained_share(&present, &unwrapped) else {
-        return Ok(Vec::new());
-    };
-    let max_unexplained = max_alias_unexplained(present_unexplained);
     let comparison = Comparison {
         context,
         mosaic: &mosaic,
         unwrapped: &unwrapped,
         pose: &pose,
     };
-    // The search sees the correlation with its noise.
-    let min_squared_correlation = MIN_SQUARED_CORRELATION_LEFT
-        * (1.0 - max_unexplained).max(0.0)
-        * present.texture_share().powi(2);
+    let texture_share = comparison.ncc_score([0.0; 2]).texture_share();
+    let Some(present) = comparison.unexplained([0.0; 2]) else {
+        return Ok(Vec::new());
+    };
+    let min_squared_correlation =
+        MIN_SQUARED_CORRELATION_LEFT * present.min_squared_correlation(texture_share);
     let shifts = find_matching_shifts(&mosaic, &unwrapped, &pose, reach_m, min_squared_correlation);
     let spacing_m = mosaic.grid.spacing_m;
     let mut motions = Vec::new();
@@ -90,7 +87,7 @@ pub fn find_alias_motions(
         }
         let (unexplained, shift_m) = comparison.refine_shift(shift_m, spacing_m);
         let (made_m, motion) = comparison.motion(shift_m);
-        if unexplained.is_some_and(|there| there < max_unexplained)
+        if unexplained.is_some_and(|there| present.is_matched_by(&there))
             && made_m.norm() >= MIN_SEPARATION_SAMPLES * spacing_m
         {
             motions.push(motion);
@@ -124,16 +121,23 @@ impl Comparison<'_> {
         gauge_component(self.context.surface.as_ref(), self.pose, &shift_m.into())
     }
 
-    /// Unexplained share of the texture's variance at a shift on the wall.
-    fn unexplained(&self, shift_m: [f64; 2]) -> Option<f64> {
+    /// Correlation with the mosaic at a shift on the wall.
+    fn ncc_score(&self, shift_m: [f64; 2]) -> NccScore {
         let pose = self.motion(shift_m).1.apply(self.pose);
-        let ncc_score = self.mosaic.compute_ncc(self.context, self.unwrapped, &pose);
-        unexplained_share(&ncc_score, self.unwrapped)
+        self.mosaic.compute_ncc(self.context, self.unwrapped, &pose)
+    }
+
+    /// Unexplained shares at a shift on the wall; None if too few samples are shared, or the two do
+    /// not correlate.
+    fn unexplained(&self, shift_m: [f64; 2]) -> Option<Unexplained> {
+        let ncc_score = self.ncc_score(shift_m);
+        let is_compared = ncc_score.samples >= min_samples(self.unwrapped);
+        Unexplained::of(&ncc_score).filter(|_| is_compared)
     }
 
     /// Refines a shift to a fraction of a sample by pattern search: the best of ever closer
-    /// neighbours. Returns it with its unexplained share.
-    fn refine_shift(&self, shift_m: [f64; 2], spacing_m: f64) -> (Option<f64>, [f64; 2]) {
+    /// neighbours. Returns it with its unexplained shares.
+    fn refine_shift(&self, shift_m: [f64; 2], spacing_m: f64) -> (Option<Unexplained>, [f64; 2]) {
         let mut best = (self.unexplained(shift_m), shift_m);
         let mut step = 0.5 * spacing_m;
         for _ in 0..SHIFT_REFINEMENTS {
@@ -141,44 +145,14 @@ impl Comparison<'_> {
             for (ds, dh) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
                 let shift_m = [s_m + ds * step, h_m + dh * step];
                 let there = self.unexplained(shift_m);
-                if there.is_some_and(|there| best.0.is_none_or(|best| there < best)) {
+                if there
+                    .is_some_and(|there| best.0.is_none_or(|best| there.contrast < best.contrast))
+                {
                     best = (there, shift_m);
                 }
             }
             step *= 0.5;
         }
         best
-    }
-}
-
-/// The unexplained share of the texture's variance up to which a pose matches as well as one that
-/// leaves the share `present`.
-///
-/// It is bounded by odds: (1 − u)/u no less than 1/[`MAX_UNEXPLAINED_RATIO`] of that at the present
-/// pose. Where little is explained there, a pose that explains nothing is no alias, though it
-/// leaves less than twice as much.
-fn max_alias_unexplained(present: f64) -> f64 {
-    let present = present.max(MIN_UNEXPLAINED);
-    MAX_UNEXPLAINED_RATIO * present / (1.0 + (MAX_UNEXPLAINED_RATIO - 1.0) * present)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn aliases_have_at_least_half_the_odds() {
-        let odds = |unexplained: f64| (1.0 - unexplained) / unexplained;
-        for present in [0.05, 0.3, 0.9, 0.99] {
-            let ratio = odds(max_alias_unexplained(present)) / odds(present);
-            let expected = 1.0 / MAX_UNEXPLAINED_RATIO;
-            assert!((ratio - expected).abs() < 1e-9, "{present}: {ratio}");
-        }
-        // Poses whose match differs from a perfect one by noise alone are no worse.
-        assert_eq!(
-            max_alias_unexplained(0.0),
-            max_alias_unexplained(MIN_UNEXPLAINED)
-        );
-        assert!(max_alias_unexplained(0.99) < 1.0);
     }
 }
