@@ -162,7 +162,7 @@ pub struct RefineReport {
     pub levels: Vec<LevelReport>,
     /// Frames in order.
     pub frames: Vec<FrameReport>,
-    /// Frames whose pose rests on the prior.
+    /// Frames whose pose rests on the prior: neither photometric nor uncertain.
     pub frames_on_prior: usize,
     /// Treatment of the light: by the model, or by local normalisation.
     pub photometry: Photometry,

@@ -233,14 +233,19 @@ fn rolling_shutter_warning(rows: &ReadoutEstimate) -> String {
 
 /// Warns of the frames that are rejected.
 fn warn_of_frames(report: &RefineReport, terminal: &Terminal) {
-    if report.frames_on_prior == 0 {
-        return;
+    let all = report.frames.len();
+    let uncertain = report.count_flagged(FrameFlag::Uncertain);
+    if uncertain > 0 {
+        terminal.warn(format!(
+            "{uncertain} of {all} frames are refined less exactly than asked for:"
+        ));
     }
-    terminal.warn(format!(
-        "{} of {} frames are rejected, so their poses rest on the prior:",
-        report.frames_on_prior,
-        report.frames.len()
-    ));
+    if report.frames_on_prior > 0 {
+        terminal.warn(format!(
+            "{} of {all} frames are rejected, so their poses rest on the prior:",
+            report.frames_on_prior,
+        ));
+    }
     let contradicts = report.prior_test.contradicting_scale().is_some();
     if report.frames_on_prior == report.frames.len() && !contradicts {
         terminal.warn(explain_failure(report));
@@ -250,11 +255,7 @@ fn warn_of_frames(report: &RefineReport, terminal: &Terminal) {
 
 /// Possible causes where no frame is photometric.
 fn explain_failure(report: &RefineReport) -> &'static str {
-    if 2 * report.count_flagged(FrameFlag::Uncertain) > report.frames.len() {
-        "  no frame is photometric: frames fit each other, but the wall shows too little texture, \
-         or too much noise, for their places on it; --max-sigma-px accepts more uncertain ones, \
-         and more light, less compression or more overlap make them certain"
-    } else if 2 * report.count_flagged(FrameFlag::Ambiguous) > report.frames.len() {
+    if 2 * report.count_flagged(FrameFlag::Ambiguous) > report.frames.len() {
         "  no frame is photometric: the wall repeats itself, and the initial poses are too \
          uncertain to tell its repetitions apart; more exact ones, with a smaller σ under \
          [prior], do"

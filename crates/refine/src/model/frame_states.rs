@@ -91,8 +91,12 @@ impl FrameStates {
     }
 }
 
-/// Finds out whether most of the frames that show something fit each other. One whose pixels tell
-/// little does, too.
+/// True for a frame that its pixels place among the others, as exactly as the user asks for or not.
+pub fn is_placed(rejection: &Option<RejectionReason>) -> bool {
+    rejection.as_ref().is_none_or(RejectionReason::is_uncertain)
+}
+
+/// Finds out whether most of the frames that show something fit each other, and are placed.
 ///
 /// # Errors
 /// The reason for which none of them is right otherwise: they may fit each other by chance, and a
@@ -102,10 +106,7 @@ pub fn majority(rejections: &[Option<RejectionReason>]) -> Result<(), RejectionR
         !(rejection.as_ref()).is_some_and(RejectionReason::shows_nothing)
     };
     let shown = rejections.iter().filter(shows_something).count();
-    let fits = |rejection: &&Option<RejectionReason>| {
-        rejection.as_ref().is_none_or(RejectionReason::is_uncertain)
-    };
-    let frames = rejections.iter().filter(fits).count();
+    let frames = rejections.iter().filter(|r| is_placed(r)).count();
     if frames > 1 && 2 * frames > shown {
         Ok(())
     } else {

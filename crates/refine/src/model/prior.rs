@@ -270,17 +270,17 @@ impl Prior {
     }
 
     /// Motion along the gauge that minimises the cost of the prior: that of the first frame for a
-    /// random walk, led there from the first of the frames `photometric` by the initial steps; of
+    /// random walk, led there from the first of the frames `placed` by the initial steps; of
     /// all of these frames for independent errors.
     pub fn align_gauge(
         &self,
         gauge: &Gauge,
         estimates: &[FrameEstimate],
         datum: &Datum,
-        photometric: &[bool],
+        placed: &[bool],
     ) -> GaugeMotion {
         let initial = |k: usize| datum.to_nominal_tunnel(&self.initial[k]);
-        let chosen = (0..estimates.len()).filter(|k| photometric[*k]);
+        let chosen = (0..estimates.len()).filter(|k| placed[*k]);
         let pairs = chosen.map(|k| (k, estimates[k].pose));
         let (poses, initial): (Vec<Pose>, Vec<Pose>) = match self.jitter.model {
             JitterModel::RandomWalk => pairs

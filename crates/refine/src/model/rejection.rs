@@ -89,8 +89,8 @@ impl RejectionReason {
         matches!(self, Self::Featureless | Self::Repeated(_))
     }
 
-    /// True if the image fits the other frames, and tells too little of its pose. If that is not
-    /// even known to a pixel, it may fit by chance.
+    /// True if the image fits the other frames and places itself among them, though less surely
+    /// than the user asks for. If its place is not even known to a pixel, it may fit by chance.
     pub fn is_uncertain(&self) -> bool {
         matches!(self, Self::Uncertain { wall_px } if *wall_px < 1.0)
     }

@@ -3,7 +3,7 @@
 use crate::comparison::inconsistent_frames::FrameComparison;
 use crate::error::RefineError;
 use crate::model::context::EstimationContext;
-use crate::model::frame_states::{FrameStates, majority};
+use crate::model::frame_states::{FrameStates, is_placed, majority};
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS, Calibration, Kappa};
@@ -113,9 +113,7 @@ pub fn without_solution(
         .map(|pose| FrameEstimate::at(*pose))
         .collect();
     let datum = setup.calibration.datum(&Kappa::zeros());
-    for rejection in &mut rejections {
-        rejection.get_or_insert_with(|| reason.clone());
-    }
+    reject_placed(&mut rejections, reason);
     let placement = Placement::new(setup, &datum, (&estimates, None), &unknown, rejections);
     let frames = (0..count).map(|k| placement.report_frame(setup, k, FrameSigma::unknown()));
     let parts = ReportParts {
@@ -179,9 +177,17 @@ fn judge(
         *rejection = evidence.judge(setup.options);
     }
     if let Err(reason) = majority(rejections) {
-        for rejection in rejections {
-            rejection.get_or_insert_with(|| reason.clone());
-        }
+        reject_placed(rejections, &reason);
+    }
+}
+
+/// Rejects all frames that are not rejected yet, and those that are for being uncertain.
+fn reject_placed(rejections: &mut [Option<RejectionReason>], reason: &RejectionReason) {
+    for rejection in rejections
+        .iter_mut()
+        .filter(|rejection| is_placed(rejection))
+    {
+        *rejection = Some(reason.clone());
     }
 }
 

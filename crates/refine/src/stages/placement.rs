@@ -1,5 +1,6 @@
-//! Final poses: those of photometric frames as solved, all others by the prior.
+//! Final poses: those of frames that their pixels place as solved, all others by the prior.
 
+use crate::model::frame_states::is_placed;
 use crate::model::rejection::RejectionReason;
 use crate::options::Photometry;
 use crate::parameters::calibration::Datum;
@@ -75,8 +76,8 @@ pub struct ReportParts {
 
 impl Placement {
     /// Aligns the estimates with the initial poses along the gauge, tests the prior, and gives all
-    /// frames that are not photometric their poses by it. If the prior contradicts the lengths, no
-    /// frame is photometric.
+    /// frames that are neither photometric nor uncertain their poses by it. If the prior contradicts
+    /// the lengths, no frame is photometric.
     pub fn new(
         setup: &Setup,
         datum: &Datum,
@@ -85,9 +86,9 @@ impl Placement {
         mut rejections: Vec<Option<RejectionReason>>,
     ) -> Self {
         let prior = &setup.prior;
-        let mut photometric: Vec<bool> = rejections.iter().map(Option::is_none).collect();
+        let mut placed = placed(&rejections);
         let gauge = setup.initial_context(PictureNoise::default()).gauge();
-        let motion = prior.align_gauge(&gauge, estimates, datum, &photometric);
+        let motion = prior.align_gauge(&gauge, estimates, datum, &placed);
         let planned = &setup.input.surface;
         let before = bent(planned, datum.bend);
         let datum = &datum.moved(&motion);
@@ -105,15 +106,16 @@ impl Placement {
             (datum, radius_m),
             &poses,
             &covariances,
-            &photometric,
+            &placed,
             alpha,
         );
         if let Some(scale) = prior_test.contradicting_scale() {
             let factor = scale.factor;
-            for rejection in &mut rejections {
-                rejection.get_or_insert(RejectionReason::ContradictsScale { factor });
+            for (rejection, placed) in rejections.iter_mut().zip(&mut placed) {
+                if std::mem::take(placed) {
+                    *rejection = Some(RejectionReason::ContradictsScale { factor });
+                }
             }
-            photometric.fill(false);
         }
         for rejection in rejections.iter_mut().flatten() {
             if let RejectionReason::Ambiguous { other, .. } = rejection {
@@ -123,22 +125,22 @@ impl Placement {
         let bridging = Bridging {
             prior,
             datum,
-            photometric: &photometric,
+            placed: &placed,
         };
         if bridging
             .apply(&mut estimates, &mut covariances.frames)
             .is_err()
         {
-            for k in (0..estimates.len()).filter(|k| !photometric[*k]) {
+            for k in (0..estimates.len()).filter(|k| !placed[*k]) {
                 covariances.frames[k] = Matrix6::from_element(f64::NAN);
             }
         }
         for k in 1..estimates.len() {
-            if !(photometric[k - 1] && photometric[k]) {
+            if !(placed[k - 1] && placed[k]) {
                 covariances.next[k - 1] = Matrix6::from_element(f64::NAN);
             }
         }
-        let is_kept = !photometric.contains(&true);
+        let is_kept = !placed.contains(&true);
         let poses = estimates
             .iter()
             .zip(&prior.initial)
@@ -186,12 +188,11 @@ impl Placement {
             inlier_share: 0.0,
             gain: 1.0,
             bias: 0.0,
-            sigma: match rejection {
-                None => sigma,
-                Some(_) => {
-                    let covariance = &self.covariances.frames[k];
-                    compute_frame_sigma(surface, camera, &self.estimates[k], covariance)
-                }
+            sigma: if is_placed(&self.rejections[k]) {
+                sigma
+            } else {
+                let covariance = &self.covariances.frames[k];
+                compute_frame_sigma(surface, camera, &self.estimates[k], covariance)
             },
             overdispersion_px: 0.0,
         }
@@ -199,16 +200,20 @@ impl Placement {
 
     /// The result.
     pub fn refined(self, setup: &Setup, parts: ReportParts) -> Refined {
-        let photometric: Vec<FrameSigma> = (parts.frames.iter())
-            .filter(|frame| frame.flag == FrameFlag::Photometric)
-            .map(|frame| frame.sigma)
-            .collect();
+        let sigmas = |flag: FrameFlag| -> Vec<FrameSigma> {
+            let frames = parts.frames.iter().filter(|frame| frame.flag == flag);
+            frames.map(|frame| frame.sigma).collect()
+        };
+        let [photometric, uncertain] = [FrameFlag::Photometric, FrameFlag::Uncertain].map(sigmas);
+        let placed_frames = photometric.len() + uncertain.len();
+        let is_any_placed = placed_frames > 0;
         let radius_m = setup.input.nominal_radius_m;
         let scale = self.prior_test.contradicting_scale();
         let contradiction = scale.map(|scale| scale.explain(radius_m));
         let verdict = SurveyVerdict::new(
-            &photometric,
+            (&photometric, &uncertain),
             parts.frames.len(),
+            setup.options.max_sigma_px,
             parts.model_error.as_ref(),
             contradiction.as_deref(),
         );
@@ -216,7 +221,7 @@ impl Placement {
         let radius = (radius_m, setup.input.radius_sigma);
         let length_scale = LengthScale::new(radius, parts.calibration.as_ref(), points.as_ref());
         let (by, scale) = self.wall_motion;
-        let masked = parts.masked.filter(|_| !photometric.is_empty());
+        let masked = parts.masked.filter(|_| is_any_placed);
         let masked = masked.map(|masked| masked.moved(by, scale));
         let poses = setup.input.initial.iter().zip(self.poses);
         let poses = poses.map(|(initial, pose)| StampedPose {
@@ -226,15 +231,13 @@ impl Placement {
         let trajectory: Trajectory = poses.collect();
         let rig = setup.input.rig.as_ref();
         let mounts = rig.map_or_else(Vec::new, |rig| {
-            let is_photometric = self.rejections.iter().map(Option::is_none);
-            let is_photometric: Vec<bool> = is_photometric.collect();
-            MountReport::of_rig(rig, &poses_of(&trajectory), &is_photometric)
+            MountReport::of_rig(rig, &poses_of(&trajectory), &placed(&self.rejections))
         });
         Refined {
             bodies: rig.map(|rig| bodies(rig, &trajectory)),
             trajectory,
             report: RefineReport {
-                frames_on_prior: parts.frames.len() - photometric.len(),
+                frames_on_prior: parts.frames.len() - placed_frames,
                 frames: parts.frames,
                 stopped_because: parts.stopped_because,
                 levels: parts.levels.into_iter().map(LevelReport::from).collect(),
@@ -257,7 +260,7 @@ impl Placement {
                 masked: (masked.as_ref())
                     .map(|masked| MaskedReport::new(masked, self.nominal.as_ref(), scale)),
                 hidden_bands: (setup.hidden_bands.iter())
-                    .filter(|_| !photometric.is_empty())
+                    .filter(|_| is_any_placed)
                     .map(|band| HiddenBand::between(*band))
                     .collect(),
                 bend: (self.bend.zip(parts.bend_sigma_per_m))
@@ -272,6 +275,11 @@ impl Placement {
             masked,
         }
     }
+}
+
+/// True for every frame that its pixels place.
+fn placed(rejections: &[Option<RejectionReason>]) -> Vec<bool> {
+    rejections.iter().map(is_placed).collect()
 }
 
 /// The poses of a rig's body by those of its cameras, at the times of the moments.

@@ -1,9 +1,9 @@
-//! Poses of frames that are not photometric: by the prior, between those that are.
+//! Poses of frames that the pixels do not place: by the prior, between those that they place.
 //!
-//! A run of such frames between two photometric ones is where the prior puts it with both ends
+//! A run of such frames between two placed ones is where the prior puts it with both ends
 //! held: a random walk bridges the gap, with the error of the initial steps spread over it; with
 //! independent errors each frame stays at its initial pose, or where the relation of a rig puts it
-//! from another one of its moment. Without photometric frames all keep their initial poses. No
+//! from another one of its moment. Without placed frames all keep their initial poses. No
 //! frame that does not know its place moves another, or is moved.
 
 use crate::linear::factor_error::FactorError;
@@ -21,18 +21,18 @@ use tunnelstitch_geometry::trajectory::JitterModel;
 /// each step squares that.
 const STEPS: usize = 4;
 
-/// The prior's bridges over the frames that are not photometric.
+/// The prior's bridges over the frames that are not placed.
 pub struct Bridging<'b> {
     /// The prior.
     pub prior: &'b Prior,
     /// The transform of the initial poses to the tunnel.
     pub datum: &'b Datum,
-    /// Which frames are photometric.
-    pub photometric: &'b [bool],
+    /// Which frames are placed by their pixels.
+    pub placed: &'b [bool],
 }
 
 impl Bridging<'_> {
-    /// Replaces the poses of the frames that are not photometric, and their covariances: that of
+    /// Replaces the poses of the frames that are not placed, and their covariances: that of
     /// the bridge, plus that of the nearest end. The `estimates` are aligned with the initial poses
     /// along the gauge.
     ///
@@ -43,7 +43,7 @@ impl Bridging<'_> {
         estimates: &mut [FrameEstimate],
         covariances: &mut [Matrix6<f64>],
     ) -> Result<(), FactorError> {
-        for gap in gaps(self.photometric) {
+        for gap in gaps(self.placed) {
             self.predict(&gap, estimates);
             let inverse = self.solve(&gap, estimates)?;
             for k in gap.clone() {
@@ -127,10 +127,10 @@ impl Bridging<'_> {
     }
 }
 
-/// Runs of frames that are not photometric.
-fn gaps(photometric: &[bool]) -> Vec<Range<usize>> {
+/// Runs of frames that are not placed.
+fn gaps(placed: &[bool]) -> Vec<Range<usize>> {
     let mut gaps: Vec<Range<usize>> = Vec::new();
-    for (k, _) in photometric.iter().enumerate().filter(|(_, is)| !**is) {
+    for (k, _) in placed.iter().enumerate().filter(|(_, is)| !**is) {
         match gaps.last_mut() {
             Some(gap) if gap.end == k => gap.end = k + 1,
             _ => gaps.push(k..k + 1),
@@ -164,12 +164,12 @@ mod tests {
         }
     }
 
-    fn bridge(prior: &Prior, photometric: [bool; 9]) -> (Vec<Pose>, Vec<Matrix6<f64>>) {
+    fn bridge(prior: &Prior, placed: [bool; 9]) -> (Vec<Pose>, Vec<Matrix6<f64>>) {
         let calibration = Calibration::none(Camera::from_vertical_fov(160, 120, 1.0));
         // Photometric frames lie 1 cm more to the side with each step, the others anywhere.
         let mut estimates: Vec<_> = (0..9)
             .map(|k| {
-                let shift = Vector3::x() * if photometric[k] { 0.01 * k as f64 } else { 7.0 };
+                let shift = Vector3::x() * if placed[k] { 0.01 * k as f64 } else { 7.0 };
                 let initial = &prior.initial[k];
                 FrameEstimate::at(Pose::new(initial.r_wc, initial.t_wc + shift))
             })
@@ -178,7 +178,7 @@ mod tests {
         let bridging = Bridging {
             prior,
             datum: &calibration.datum(&Kappa::zeros()),
-            photometric: &photometric,
+            placed: &placed,
         };
         bridging.apply(&mut estimates, &mut covariances).unwrap();
         (estimates.iter().map(|e| e.pose).collect(), covariances)
@@ -187,10 +187,10 @@ mod tests {
     #[test]
     fn a_walk_bridges_a_gap_and_goes_on_from_an_end() {
         let prior = prior(JitterModel::RandomWalk);
-        let mut photometric = [true; 9];
-        photometric[3..6].fill(false);
-        photometric[8] = false;
-        let (poses, covariances) = bridge(&prior, photometric);
+        let mut placed = [true; 9];
+        placed[3..6].fill(false);
+        placed[8] = false;
+        let (poses, covariances) = bridge(&prior, placed);
         for (k, pose) in poses.iter().enumerate() {
             let expected = if k == 8 { 0.07 } else { 0.01 * k as f64 };
             let error = pose.t_wc - prior.initial[k].t_wc - Vector3::x() * expected;
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_photometric_and_independent_errors_keep_the_initial_poses() {
+    fn nothing_placed_and_independent_errors_keep_the_initial_poses() {
         for model in [JitterModel::RandomWalk, JitterModel::Independent] {
             let prior = prior(model);
             let (poses, _) = bridge(&prior, [false; 9]);
@@ -211,10 +211,10 @@ mod tests {
                 assert!(initial.local(pose).norm() < 1e-12);
             }
         }
-        let mut photometric = [true; 9];
-        photometric[4] = false;
+        let mut placed = [true; 9];
+        placed[4] = false;
         let prior = prior(JitterModel::Independent);
-        let (poses, _) = bridge(&prior, photometric);
+        let (poses, _) = bridge(&prior, placed);
         assert!(prior.initial[4].local(&poses[4]).norm() < 1e-12);
     }
 }

@@ -1,7 +1,7 @@
 //! Test of the prior: refined steps against initial ones.
 //!
-//! The prior says how far the initial poses are off. Where frames are photometric, their refined
-//! poses show how far they are: errors e of the steps of a random walk, or of the poses themselves,
+//! The prior says how far the initial poses are off. Where frames are placed by their pixels, their
+//! refined poses show how far they are: errors e of the steps of a random walk, or of the poses themselves,
 //! each with the variance σ² that the prior states, less what the refined pose is uncertain by.
 //!
 //! - **Scale.** Pictures show lengths in units of the radius only, so a radius that is wrong makes
@@ -92,17 +92,17 @@ struct PriorError {
 }
 
 impl PriorTest {
-    /// Tests the prior on the photometric frames. `estimates` and `covariances` are aligned with
+    /// Tests the prior on the frames that are placed. `estimates` and `covariances` are aligned with
     /// the initial poses along the gauge; `radius_m`: as given; `alpha`: rate of false alarms.
     pub fn new(
         prior: &Prior,
         (datum, radius_m): (&Datum, f64),
         poses: &[Pose],
         covariances: &Covariances,
-        photometric: &[bool],
+        placed: &[bool],
         alpha: f64,
     ) -> Self {
-        let errors = errors(prior, datum, poses, covariances, photometric);
+        let errors = errors(prior, datum, poses, covariances, placed);
         let sigmas = (0..NAMES.len()).filter_map(|k| test_sigma(prior, &errors, k, alpha));
         let expects_walk = prior.jitter.model == JitterModel::RandomWalk;
         let mut test = Self {
@@ -190,13 +190,13 @@ impl ScaleTest {
     }
 }
 
-/// The errors that photometric frames show.
+/// The errors that placed frames show.
 fn errors(
     prior: &Prior,
     datum: &Datum,
     poses: &[Pose],
     covariances: &Covariances,
-    photometric: &[bool],
+    placed: &[bool],
 ) -> Vec<PriorError> {
     let r = prior.jitter.rotation_sigma_rad;
     let [x, y, z] = prior.jitter.translation_sigma_m;
@@ -207,11 +207,11 @@ fn errors(
         .map(|pose| datum.to_tunnel(pose))
         .collect();
     // Of a rig, the noise is that of its first camera.
-    let is_tested = |k: &usize| photometric[*k] && !prior.is_related(*k);
+    let is_tested = |k: &usize| placed[*k] && !prior.is_related(*k);
     let chosen: Vec<usize> = (0..poses.len()).filter(is_tested).collect();
     match prior.jitter.model {
         JitterModel::RandomWalk => {
-            let pairs = chosen.iter().filter(|k| **k > 0 && photometric[**k - 1]);
+            let pairs = chosen.iter().filter(|k| **k > 0 && placed[**k - 1]);
             let of_pair = |&k: &usize| {
                 let (before, own) = (&poses[k - 1], &poses[k]);
                 let (first, start) = prior.first_of_moment(k - 1, before, datum.scale);
