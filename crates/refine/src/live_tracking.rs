@@ -14,7 +14,8 @@ use crate::tracking::prescreening::is_featureless;
 use crate::tracking::track::Tracking;
 use std::sync::Arc;
 use tunnelstitch_core::frames::{
-    FrameCache, FrameSet, GreyImage, PictureNoise, Pyramid, StoredFrame, normalise_locally,
+    FrameCache, FrameSet, GreyImage, NoiseMeasurement, PictureNoise, Pyramid, StoredFrame,
+    normalise_locally,
 };
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -38,7 +39,7 @@ pub struct LiveTracking {
     empty: Arc<Pyramid>,
     tracking: Tracking,
     /// 1-σ of the noise of the first frames, grey levels.
-    noises: Vec<PictureNoise>,
+    noises: Vec<NoiseMeasurement>,
     skipped: usize,
 }
 
@@ -187,7 +188,7 @@ impl LiveTracking {
                 .as_ref()
                 .filter(|_| self.noises.len() < NOISE_FRAMES)
             {
-                self.noises.extend(PictureNoise::of(pyramid));
+                self.noises.extend(NoiseMeasurement::of(pyramid));
             }
             let kept = pyramid.map_or_else(|| Arc::clone(&self.empty), Arc::new);
             self.pyramids.push(kept);

@@ -46,7 +46,7 @@ pub use local_contrast::{LocalContrast, local_contrast, mask_outliers};
 pub use local_normalisation::normalise_locally;
 pub use mask::{Mask, PyramidMask};
 pub use masks::Masks;
-pub use noise::{PictureNoise, noise_at_level, noise_sigma};
+pub use noise::{NoiseMeasurement, PictureNoise, noise_at_level, noise_sigma};
 pub use picture_decoder::open_picture;
 pub use picture_reading::{PictureOrientation, PictureReading};
 pub use pyramid::Pyramid;

@@ -8,47 +8,73 @@ use tunnelstitch_geometry::numerics::median::{MAD_TO_SIGMA, upper_median};
 /// Step of rows and columns at which the noise is sampled.
 const SAMPLING_STRIDE: usize = 3;
 
-/// 1-σ of what the mask of [`noise_sigma`] finds in a picture of half the size, over that of white
-/// noise at full size. Along an axis, `[1 3 3 1]/8` and `[1 −2 1]` on every other pixel make
-/// `[1 3 1 −5 −5 1 3 1]/8`, which has 18/16 of the variance, for 6 of the mask alone.
-const HALF_SIZE_RESPONSE: f64 = 18.0 / 16.0 / 6.0;
+/// Pyramid levels at which the noise of a picture is measured, from full size on.
+const MEASURED_LEVELS: usize = 3;
+/// Growth of the variance that texture shows from one level to the next: that of natural pictures,
+/// whose power spectra fall with the square of the frequency.
+const TEXTURE_GROWTH: f64 = 4.0;
+
+/// Noise that the levels of a picture show, each as 1-σ of the white noise at full size of which it
+/// would show as much, grey levels. Texture counts as noise, the more, the coarser the level.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NoiseMeasurement([f64; MEASURED_LEVELS]);
+
+impl NoiseMeasurement {
+    /// Measures a picture. Levels that it does not have show what the one before shows. None if no
+    /// pixel has a value.
+    pub fn of(pyramid: &Pyramid) -> Option<Self> {
+        let mut sigmas = [noise_sigma(pyramid.level(0))?; MEASURED_LEVELS];
+        for level in 1..MEASURED_LEVELS {
+            let found = (level < pyramid.levels()).then(|| noise_sigma(pyramid.level(level)));
+            let found = found.flatten().map(|sigma| sigma / mask_response(level));
+            sigmas[level] = found.unwrap_or(sigmas[level - 1]);
+        }
+        Some(Self(sigmas))
+    }
+}
 
 /// 1-σ of the noise of pictures, in grey levels of a pixel at full size.
 ///
 /// Compression (JPEG, video) leaves out the finest noise, as nobody sees it, and keeps what is
 /// coarser. At quality 90, white noise of 3 grey levels in a dark picture looks like one of 0.7 by
-/// its finest detail, and like one of 3.2 in a picture of half the size.
+/// its finest detail, and like one of 3.2 at all coarser levels. What grows from level to level is
+/// texture. With variances `n² + t²` and `n² + G t²` of two levels,
+///
+/// `n² = (G (n² + t²) − (n² + G t²))/(G − 1)`,   `G = 4`.
+///
+/// Source: D. J. Field, "Relations between the statistics of natural images and the response
+/// properties of cortical cells", Journal of the Optical Society of America A 4(12), 1987 (spectra).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PictureNoise {
     /// That of the finest detail.
     pub fine: f64,
-    /// White noise of which a picture of half the size would show as much. It may be fine texture,
-    /// which is little beside the coarser texture that has it.
+    /// White noise of which coarser levels show as much; no less than the finest.
     pub coarse: f64,
 }
 
 impl PictureNoise {
-    /// Estimates the noise of a picture, by its first two levels if it has them; None if no pixel
-    /// has a value.
-    pub fn of(pyramid: &Pyramid) -> Option<Self> {
-        let fine = noise_sigma(pyramid.level(0))?;
-        let half = (pyramid.levels() > 1).then(|| noise_sigma(pyramid.level(1)));
-        Some(Self {
+    /// The noise by the median measurements of pictures; none if there are none.
+    pub fn median(pictures: &[NoiseMeasurement]) -> Self {
+        let median = |level: usize| {
+            let sigmas = pictures.iter().map(|picture| picture.0[level]);
+            upper_median(sigmas.collect()).unwrap_or_default()
+        };
+        let fine = median(0);
+        let [half, quarter] = [1, 2].map(|level| median(level).powi(2));
+        let noise = (TEXTURE_GROWTH * half - quarter) / (TEXTURE_GROWTH - 1.0);
+        Self {
             fine,
-            coarse: half
-                .flatten()
-                .map_or(fine, |half| half / HALF_SIZE_RESPONSE),
-        })
+            coarse: noise.clamp(fine * fine, half.max(fine * fine)).sqrt(),
+        }
     }
 
-    /// The median over pictures; no noise if there are none.
-    pub fn median(pictures: &[Self]) -> Self {
-        let median = |sigma: fn(&Self) -> f64| {
-            upper_median(pictures.iter().map(sigma).collect()).unwrap_or_default()
-        };
+    /// The mean of the noise of several stretches of a survey; none if there are none.
+    pub fn mean(stretches: &[Self]) -> Self {
+        let count = stretches.len().max(1) as f64;
+        let mean = |sigma: fn(&Self) -> f64| stretches.iter().map(sigma).sum::<f64>() / count;
         Self {
-            fine: median(|noise| noise.fine),
-            coarse: median(|noise| noise.coarse),
+            fine: mean(|noise| noise.fine),
+            coarse: mean(|noise| noise.coarse),
         }
     }
 
@@ -57,6 +83,20 @@ impl PictureNoise {
         let sigma = if level == 0 { self.fine } else { self.coarse };
         sigma * sigma * noise_at_level(level)
     }
+}
+
+/// 1-σ of what the mask of [`noise_sigma`] finds at a pyramid level, over that of white noise at
+/// full size.
+fn mask_response(level: usize) -> f64 {
+    let (kernel, step) = (level_kernel(level), 1 << level);
+    let at = |n: usize, shift: usize| {
+        let tap = n.checked_sub(shift * step).and_then(|tap| kernel.get(tap));
+        tap.copied().unwrap_or_default()
+    };
+    let taps = 0..kernel.len() + 2 * step;
+    let response = taps.map(|n| (at(n, 0) - 2.0 * at(n, 1) + at(n, 2)).powi(2));
+    // Of 6 by the mask alone along each of two axes.
+    response.sum::<f64>() / 6.0
 }
 
 /// Estimates the 1-σ noise of an image, grey levels: the median of `|M ∗ I|` with the mask
@@ -92,6 +132,20 @@ pub fn noise_sigma(image: &GreyImage) -> Option<f64> {
 /// fraction f mixes two neighbours whose noise correlates by ρ: on average over f, the fraction
 /// `2/3 + ρ/3` of the variance remains.
 pub fn noise_at_level(level: usize) -> f64 {
+    let kernel = level_kernel(level);
+    let product = |shift: usize| -> f64 {
+        kernel
+            .iter()
+            .zip(kernel.iter().skip(shift))
+            .map(|(a, b)| a * b)
+            .sum()
+    };
+    let axis = 2.0 / 3.0 * product(0) + product(1 << level) / 3.0;
+    axis * axis
+}
+
+/// The weights along an axis with which pixels at full size make one at a pyramid level.
+fn level_kernel(level: usize) -> Vec<f64> {
     let mut kernel = vec![1.0f64];
     for k in 0..level {
         // The taps of a level lie 2^k pixels apart.
@@ -104,15 +158,7 @@ pub fn noise_at_level(level: usize) -> f64 {
         }
         kernel = next;
     }
-    let product = |shift: usize| -> f64 {
-        kernel
-            .iter()
-            .zip(kernel.iter().skip(shift))
-            .map(|(a, b)| a * b)
-            .sum()
-    };
-    let axis = 2.0 / 3.0 * product(0) + product(1 << level) / 3.0;
-    axis * axis
+    kernel
 }
 
 #[cfg(test)]
@@ -142,35 +188,67 @@ mod tests {
         assert!((sigma / 3.0 - 1.0).abs() < 0.1, "{sigma}");
     }
 
-    /// In both sizes if it is white; in half the size only if the finest noise is left out, as
-    /// compression does.
-    #[test]
-    fn noise_without_its_finest_detail_is_found_in_half_the_size() {
-        let white = noisy(3.0, |_, _| 0.0);
-        let found = |image: &GreyImage| PictureNoise::of(&Pyramid::new(image.clone(), 2)).unwrap();
-        let of_white = found(&white);
-        assert!((of_white.fine / 3.0 - 1.0).abs() < 0.1, "{of_white:?}");
-        assert!((of_white.coarse / 3.0 - 1.0).abs() < 0.1, "{of_white:?}");
-        // Of the eight frequencies of a block, the upper three along either axis are left out.
+    /// A picture with the upper three of the eight frequencies of a block left out along both axes,
+    /// as compression does.
+    fn compressed(image: &GreyImage) -> GreyImage {
         let basis = |u: usize, x: usize| {
             let scale = if u == 0 { 0.125f32 } else { 0.25 }.sqrt();
             scale * (std::f32::consts::PI * (x as f32 + 0.5) * u as f32 / 8.0).cos()
         };
-        let kept =
-            |x: usize, from: usize| (0..5).map(|u| basis(u, x) * basis(u, from)).sum::<f32>();
-        let smooth = (0..256 * 256).map(|k| {
-            let (x, y) = (k % 256, k / 256);
-            let along = |n: usize, at: &dyn Fn(usize) -> f32| -> f32 {
-                (0..8)
-                    .map(|from| kept(n % 8, from) * at(n / 8 * 8 + from))
-                    .sum()
-            };
-            along(y, &|row| along(x, &|column| white.at(column, row)))
+        let kept = |x: usize, from: usize| -> f32 {
+            let frequencies = 0..5;
+            frequencies.map(|u| basis(u, x) * basis(u, from)).sum()
+        };
+        let along = |n: usize, at: &dyn Fn(usize) -> f32| -> f32 {
+            let block = 0..8;
+            let of_block = block.map(|from| kept(n % 8, from) * at(n / 8 * 8 + from));
+            of_block.sum()
+        };
+        let (width, height) = (image.width(), image.height());
+        let data = (0..width * height).map(|k| {
+            let (x, y) = (k % width, k / width);
+            along(y, &|row| along(x, &|column| image.at(column, row)))
         });
-        let of_smooth = found(&GreyImage::new(256, 256, smooth.collect()));
-        assert!(of_smooth.fine < 1.5, "{of_smooth:?}");
-        assert!((of_smooth.coarse / 3.0 - 1.0).abs() < 0.2, "{of_smooth:?}");
-        assert!(of_smooth.variance_at(1) > of_smooth.fine.powi(2) * noise_at_level(1));
+        GreyImage::new(width, height, data.collect())
+    }
+
+    #[test]
+    fn noise_without_its_finest_detail_is_found_at_coarser_levels() {
+        let found = |image: &GreyImage| {
+            let pyramid = Pyramid::new(image.clone(), MEASURED_LEVELS);
+            PictureNoise::median(&[NoiseMeasurement::of(&pyramid).unwrap()])
+        };
+        let white = noisy(3.0, |_, _| 0.0);
+        let of_white = found(&white);
+        assert!((of_white.fine / 3.0 - 1.0).abs() < 0.1, "{of_white:?}");
+        assert!((of_white.coarse / 3.0 - 1.0).abs() < 0.1, "{of_white:?}");
+        let of_compressed = found(&compressed(&white));
+        assert!(of_compressed.fine < 1.5, "{of_compressed:?}");
+        let ratio = of_compressed.coarse / 3.0;
+        assert!((ratio - 1.0).abs() < 0.2, "{of_compressed:?}");
+        let by_fine = of_compressed.fine.powi(2) * noise_at_level(1);
+        assert!(of_compressed.variance_at(1) > 2.0 * by_fine);
+        // Texture, which grows from level to level, is no noise.
+        let wall = |x: usize, y: usize| {
+            let (x, y) = (x as f32, y as f32);
+            let wave = |length: f32| {
+                let k = std::f32::consts::TAU / length;
+                0.5 * length * (k * (x + 0.7 * y)).sin() * (k * (y - 0.6 * x)).cos()
+            };
+            128.0 + wave(5.0) + wave(9.0) + wave(17.0) + wave(34.0)
+        };
+        let textured = found(&noisy(0.5, wall));
+        assert!(textured.coarse < 1.2, "{textured:?}");
+    }
+
+    #[test]
+    fn a_picture_of_a_single_level_shows_what_it_shows() {
+        let pyramid = Pyramid::new(noisy(3.0, |_, _| 0.0), 1);
+        let found = PictureNoise::median(&[NoiseMeasurement::of(&pyramid).unwrap()]);
+        assert_eq!(found.coarse, found.fine);
+        assert_eq!(PictureNoise::median(&[]), PictureNoise::default());
+        let twice = PictureNoise::mean(&[found, found]);
+        assert!((twice.fine - found.fine).abs() < 1e-12);
     }
 
     #[test]

@@ -12,6 +12,8 @@ pub struct Unexplained {
     pub texture: f64,
     /// Of the variance of the contrast, noise included.
     pub contrast: f64,
+    /// True where noise drowns the texture.
+    pub is_drowned: bool,
 }
 
 impl Unexplained {
@@ -19,9 +21,11 @@ impl Unexplained {
     pub fn of(ncc_score: &NccScore) -> Option<Self> {
         let unexplained = |correlation: f64| (1.0 - correlation.powi(2)).max(MIN_UNEXPLAINED);
         let contrast = ncc_score.correlation();
+        let texture = ncc_score.corrected_correlation();
         (contrast > 0.0).then(|| Self {
-            texture: unexplained(ncc_score.corrected_correlation().unwrap_or(1.0)),
+            texture: unexplained(texture.unwrap_or(1.0)),
             contrast: unexplained(contrast),
+            is_drowned: texture.is_none(),
         })
     }
 
@@ -104,10 +108,12 @@ mod tests {
     fn matches_are_told_by_texture_and_by_contrast() {
         let of = |c: f32, noise: f32| Unexplained::of(&compared(c, noise)).unwrap();
         let drowned = of(0.3, 0.95);
+        assert!(drowned.is_drowned);
         assert_eq!(drowned.texture, MIN_UNEXPLAINED);
         assert!(drowned.is_matched_by(&of(0.25, 0.95)));
         assert!(!drowned.is_matched_by(&of(0.15, 0.95)));
         let noisy = of(0.5, 0.5);
+        assert!(!noisy.is_drowned);
         assert!(noisy.is_matched_by(&of(0.49, 0.5)));
         assert!(!noisy.is_matched_by(&of(0.4, 0.5)));
         let least = noisy.min_squared_correlation(0.5);

@@ -143,7 +143,7 @@ fn joined_snapshot(
     } = join_unknowns(&pairs);
     let states = || ended.iter().map(Ended::state);
     let mut state = PipelineState {
-        noise: PictureNoise::median(&states().map(|state| state.noise).collect::<Vec<_>>()),
+        noise: PictureNoise::mean(&states().map(|state| state.noise).collect::<Vec<_>>()),
         is_lamp_ruled_out: states().any(|state| state.is_lamp_ruled_out),
         frames: frames.states.clone(),
         kappa: Kappa::zeros(),

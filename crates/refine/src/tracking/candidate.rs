@@ -58,7 +58,8 @@ pub fn choose_candidate<'c>(
     let no_match = |correlation| RejectionReason::NoMatch { correlation };
     let first = candidates.first().ok_or(no_match(0.0))?;
     let correlation = first.unexplained.correlation();
-    if correlation < MIN_CORRELATION || first.log_likelihood < by_chance {
+    let may_be_chance = first.unexplained.is_drowned && first.log_likelihood < by_chance;
+    if correlation < MIN_CORRELATION || may_be_chance {
         return Err(no_match(correlation));
     }
     let pixel_size_m = pixel_size_m(first);

@@ -11,7 +11,7 @@ use crate::options::RefineOptions;
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::light_model::LightModel;
 use crate::tracking::tile_views::{TileViews, calibrated_frames};
-use tunnelstitch_core::frames::{LAMP_TERMS, Lamp, Light, PictureNoise};
+use tunnelstitch_core::frames::{LAMP_TERMS, Lamp, Light, NoiseMeasurement, PictureNoise};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::mean_radius_m;
 use tunnelstitch_photometry::PhotometricCalibration;
@@ -81,10 +81,10 @@ fn lamp_beside(
 /// Median noise of the frames that the light is estimated from.
 fn median_noise(context: &EstimationContext) -> Result<PictureNoise, ProblemError> {
     let frames: Vec<usize> = calibrated_frames(context.frames.frames()).collect();
-    let noises = frames.par_map(|k| Ok(PictureNoise::of(&*context.frames.get(*k)?)));
-    let noises: Vec<Option<PictureNoise>> =
+    let noises = frames.par_map(|k| Ok(NoiseMeasurement::of(&*context.frames.get(*k)?)));
+    let noises: Vec<Option<NoiseMeasurement>> =
         noises.into_iter().collect::<Result<_, ProblemError>>()?;
-    let noises: Vec<PictureNoise> = noises.into_iter().flatten().collect();
+    let noises: Vec<NoiseMeasurement> = noises.into_iter().flatten().collect();
     Ok(PictureNoise::median(&noises))
 }
 

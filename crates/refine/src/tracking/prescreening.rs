@@ -6,7 +6,7 @@ use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::thresholds::correlation_search::MIN_OVERLAP_SHARE;
 use crate::thresholds::prescreening::{MAX_REPEAT_DIFFERENCE_GREY, MIN_CONTRAST_GREY};
-use tunnelstitch_core::frames::{GreyImage, PictureNoise};
+use tunnelstitch_core::frames::{GreyImage, NoiseMeasurement, PictureNoise};
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::viewing_distance;
@@ -50,10 +50,10 @@ pub fn prescreen(
             .par_map(|k| {
                 let frame = context.frames.get(k)?;
                 progress.advance(1);
-                Ok((frame.level(coarsest).clone(), PictureNoise::of(&frame)))
+                Ok((frame.level(coarsest).clone(), NoiseMeasurement::of(&frame)))
             })
             .into_iter()
-            .collect::<Result<Vec<(GreyImage, Option<PictureNoise>)>, ProblemError>>()?;
+            .collect::<Result<Vec<(GreyImage, Option<NoiseMeasurement>)>, ProblemError>>()?;
         for (k, (picture, noise)) in (start..).zip(pictures) {
             size = (picture.width(), picture.height());
             sums.resize(size.0 * size.1, [0.0; 2]);

@@ -8,8 +8,9 @@
 //!
 //! `κ = δᵀ(g(x + δ) − g(x)) / δᵀ(H − P) δ`,
 //!
-//! over the poses' part of δ. Over all unknowns of all frames, what single tiles contribute by
-//! chance averages out, so a share of the tiles is enough. κ is about 0.9 for Gaussian residuals,
+//! over δ of the poses and of the wall's shape, which hold each other's place: a change of the one
+//! without the other's would move both far along what the pixels hardly tell apart. Over all
+//! unknowns of all frames, what single tiles contribute by chance averages out, so a share of the tiles is enough. κ is about 0.9 for Gaussian residuals,
 //! as weights fall where residuals grow (`ψ' ≤ ω`), and far less where the slopes of a faint wall
 //! are noise: then the score hardly changes, and the estimate is much less certain than H says.
 //!
@@ -38,7 +39,7 @@ use crate::linear::normal_equations::{Block, Pattern};
 use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
-use crate::parameters::frame_estimate::FrameStep;
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::linearisation::Linearisation;
 use crate::problem::photometric_problem::PhotometricProblem;
@@ -111,7 +112,8 @@ pub fn observe_curvature(
     }
     let stride = problem.mean_change_share(at);
     let change = problem.pixel_gradient_change(at, (from, &to), (&step, &predicted), stride)?;
-    let [observed, expected] = [change, predicted].map(|gradient| poses_part(&gradient[..frames]));
+    let [observed, expected] =
+        [change, predicted].map(|gradient| without_exposures(gradient, frames));
     let along = |gradient: &[FrameStep]| dot(&step, gradient);
     let mean = along(&observed) / along(&expected);
     if mean.is_nan() || mean <= NO_CURVATURE {
@@ -147,14 +149,12 @@ fn information_of_frames(
     f64::exp(sum / f64::max(count, 1.0))
 }
 
-/// Gradients of their poses alone.
-fn poses_part(gradient: &[FrameStep]) -> Vec<FrameStep> {
-    let of_pose = |gradient: &FrameStep| {
-        let mut part = FrameStep::zeros();
-        part.rows_mut(0, POSE).copy_from(&gradient.rows(0, POSE));
-        part
-    };
-    gradient.iter().map(of_pose).collect()
+/// Gradients of the slots, the first `frames` of which are frames, without those of exposures.
+fn without_exposures(mut gradient: Vec<FrameStep>, frames: usize) -> Vec<FrameStep> {
+    for of_frame in &mut gradient[..frames] {
+        of_frame.rows_mut(POSE, FRAME_PARAMETERS - POSE).fill(0.0);
+    }
+    gradient
 }
 
 /// Sum of the products of steps and gradients, as far as there are both.
