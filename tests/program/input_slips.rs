@@ -322,8 +322,8 @@ fn comments_quotes_and_titles_of_other_programs_are_read() {
         .map(|row| format!("\"{}\"\n", row.join("\",\"")));
     // Rows of names in another order than the frames.
     let named = rows.iter().enumerate().rev();
-    let named = named.map(|(k, row)| format!("D:\\Kanal\\{k:06}.jpg;{}\n", row.join(";")));
-    let titles = "Bild;Zeit [s];X;Y;Z;qx;qy;qz;qw\n".replace("Zeit [s]", "time [s]");
+    let named = named.map(|(k, row)| format!("D:\\Kanal\\{k:06}.jpg;{}\n", row[1..].join(";")));
+    let titles = "Bild;X;Y;Z;qx;qy;qz;qw\n".to_owned();
     for content in [
         format!("% time tx ty tz qx qy qz qw\n%% of the odometry\n{right}"),
         format!("// time, pose\n\n{right}"),

@@ -58,16 +58,18 @@ impl Comparison {
             && self.agree(&evidence)
     }
 
-    /// True if three quarters of the pairs that tell a reading from the one given speak for it, or
-    /// if their evidence exceeds its scatter. (Of a pair's small evidence, the errors of its poses
-    /// may turn the sign: twice the radius that they have room for.)
+    /// True if three quarters of the pairs that tell a reading from the one given speak for it, or,
+    /// where as many fit as given, too, if their evidence exceeds its scatter: the errors of poses
+    /// may turn the sign of a pair's small evidence. (Where pairs do not fit, that is large.)
     fn agree(&self, evidence: &[f64]) -> bool {
         let pairs = evidence.iter().zip(&self.telling);
         let telling = pairs.filter(|(_, tells)| **tells).map(|(nats, _)| *nats);
         let telling: Vec<f64> = telling.collect();
         let speaks = |nats: &&f64| **nats > self.min_pair_nats;
         let for_it = telling.iter().filter(speaks).count();
-        4 * for_it >= 3 * telling.len() || (self.min_pair_nats == 0.0 && exceeds_scatter(&telling))
+        let fit_as_given = self.of_given.iter().flatten().count();
+        let is_small = self.min_pair_nats == 0.0 && 4 * fit_as_given >= 3 * self.of_given.len();
+        4 * for_it >= 3 * telling.len() || (is_small && exceeds_scatter(&telling))
     }
 
     /// Evidence of all pairs, nats, in which no pair that does not fit as given speaks louder for
@@ -159,6 +161,13 @@ mod tests {
         assert!(comparison(0.0).may_take(&mixed));
         // Of poses of other frames, each pair must tell.
         assert!(!comparison(18.0).may_take(&mixed));
+        // Weak pictures fit by chance, or not.
+        let weak = Comparison {
+            of_given: [&[None; 3], &given[3..]].concat(),
+            ..comparison(0.0)
+        };
+        let by_chance = [5.0, 5.0, 5.0, 8.0, 28.0, 17.0, 16.0, 12.0].map(fits);
+        assert!(!weak.may_take(&by_chance));
         let single = [6.5, 7.4, 11.4, 8.4, 0.0, 17.2, 15.0, 16.0].map(fits);
         assert!(!comparison(0.0).may_take(&single));
     }
