@@ -55,8 +55,8 @@ fn weak_overlap(check: &Check) -> Option<String> {
     let overlap = &check.overlap;
     (check.frames > 1 && overlap.least_neighbours < MIN_OVERLAP).then(|| {
         format!(
-            "frames {} and {} overlap by {} % according to the initial poses; refine needs {} % or \
-             more: take frames at smaller steps, or check radius_m and the units of the poses",
+            "frames {} and {} overlap by {} % according to the initial poses, radius_m and the \
+             calibration; refine needs {} % or more, as of frames at smaller steps",
             overlap.least_after,
             overlap.least_after + 1,
             percent(overlap.least_neighbours),

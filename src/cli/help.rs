@@ -19,6 +19,15 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("The program", &["config", "completions", "man", "help"]),
 ];
 
+/// Groups of options that the short help (`-h`) leaves out.
+const LONG_HELP_GROUPS: [&str; 5] = [
+    "Reading poses (overrides survey.toml)",
+    "Reading frames (overrides survey.toml)",
+    "Degradations (none by default)",
+    "Real pictures (ideal by default)",
+    "The wall as built (as drawn by default)",
+];
+
 /// Width of the column of names.
 const NAME_COLUMNS: usize = 14;
 /// Width of a line.
@@ -49,6 +58,17 @@ pub fn group_commands(command: Command) -> Command {
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{list}\
          {header}Options:{header:#}\n{{options}}{{after-help}}"
     ))
+}
+
+/// Leaves groups of rarely used options out of the short help of the commands.
+pub fn shorten_short_help(command: Command) -> Command {
+    command.mut_subcommands(|sub| {
+        sub.mut_args(|argument| {
+            let heading = argument.get_help_heading();
+            let is_rare = heading.is_some_and(|heading| LONG_HELP_GROUPS.contains(&heading));
+            argument.hide_short_help(is_rare)
+        })
+    })
 }
 
 /// Breaks a description so that it stays within its column.

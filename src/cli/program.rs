@@ -5,7 +5,7 @@ use super::commands::{
     plan_job, project, refine, report, run_job, run_task, shell, simulate, stitch, view,
 };
 use super::configuration;
-use super::help::group_commands;
+use super::help::{group_commands, shorten_short_help};
 use super::output::{
     Failure, RunRecord, Terminal, end_capture, print_error, print_failures_as_json,
     refused_arguments,
@@ -117,7 +117,8 @@ enum Command {
 pub fn run() -> Result<(), Failure> {
     let arguments: Vec<_> = std::env::args_os().collect();
     print_failures_as_json(configuration::asks_for_json(&arguments));
-    let command = configuration::with_variables(group_commands(Cli::command()));
+    let command = shorten_short_help(group_commands(Cli::command()));
+    let command = configuration::with_variables(command);
     let parsed = configuration::parse(&command, arguments)?;
     let cli = Cli::from_arg_matches(&parsed.matches).map_err(|error| refused_arguments(&error))?;
     print_failures_as_json(cli.global.json);
@@ -223,7 +224,7 @@ mod tests {
     use std::ffi::OsString;
 
     fn definition() -> clap::Command {
-        with_variables(group_commands(Cli::command()))
+        with_variables(shorten_short_help(group_commands(Cli::command())))
     }
 
     fn survey(options: &str) -> tempfile::TempDir {

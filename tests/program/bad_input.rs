@@ -113,7 +113,12 @@ fn a_camera_outside_the_tunnel() {
     let message = refine_after(|dir| edit(&dir.join("baseline.tum"), "1.0 0 0.1 0", "1.0 4 0.1 0"));
     assert_says(
         &message,
-        &["baseline.tum", "frame 1", "outside the tunnel", "radius_m"],
+        &[
+            "baseline.tum",
+            "frame 1",
+            "outside the tunnel",
+            "1 of 3 cameras are",
+        ],
     );
 }
 

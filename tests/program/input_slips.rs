@@ -298,3 +298,65 @@ fn angles_in_the_other_unit_are_named_by_the_pictures() {
     edit(&toml, "\"rad\"", "\"deg\"");
     assert_eq!(readings(), Value::Null);
 }
+
+/// Comments of MATLAB and C, numbers in quotes, titles in any language, and slips of survey.toml.
+#[test]
+fn comments_quotes_and_titles_of_other_programs_are_read() {
+    let survey = first_frames(4);
+    let dir = survey.path();
+    let file = dir.join("baseline.tum");
+    let right = std::fs::read_to_string(&file).unwrap();
+    let read = || {
+        let out = dir.join("read.tum");
+        let convert = ["convert", text(dir), "--poses", "initial", "--to", "tum"];
+        succeed(&[&convert[..], &["--out", text(&out)]].concat());
+        std::fs::read_to_string(&out).unwrap()
+    };
+    let expected = read();
+    let rows: Vec<Vec<&str>> = right
+        .lines()
+        .map(|line| line.split(' ').collect())
+        .collect();
+    let quoted = rows
+        .iter()
+        .map(|row| format!("\"{}\"\n", row.join("\",\"")));
+    // Rows of names in another order than the frames.
+    let named = rows.iter().enumerate().rev();
+    let named = named.map(|(k, row)| format!("D:\\Kanal\\{k:06}.jpg;{}\n", row[1..].join(";")));
+    let titles = "Bild;X;Y;Z;qx;qy;qz;qw\n".to_owned();
+    for content in [
+        format!("% time tx ty tz qx qy qz qw\n%% of the odometry\n{right}"),
+        format!("// time, pose\n\n{right}"),
+        quoted.collect(),
+        titles + &named.collect::<String>(),
+    ] {
+        std::fs::write(&file, &content).unwrap();
+        assert_eq!(read(), expected, "{content}");
+    }
+    let without_header = rows.iter().enumerate();
+    let without_header =
+        without_header.map(|(k, row)| format!("frames/{k:06}.jpg {}\n", row[1..].join(" ")));
+    std::fs::write(&file, without_header.collect::<String>()).unwrap();
+    let refused = fail(&["check", text(dir)], 3);
+    assert!(
+        refused.contains("a first line `file tx ty tz qx qy qz qw` says so"),
+        "{refused}"
+    );
+    let toml = dir.join("survey.toml");
+    for (from, to, expected) in [
+        (
+            "radius_m = 3.0",
+            "radius_m = 3,0",
+            "decimals follow a point",
+        ),
+        ("\"frames/", "\"frames\\", "write `/`, or single quotes"),
+    ] {
+        edit(&toml, from, to);
+        let refused = fail(&["check", text(dir)], 3);
+        assert!(
+            refused.contains("survey.toml:") && refused.contains(expected),
+            "{refused}"
+        );
+        edit(&toml, to, from);
+    }
+}

@@ -42,6 +42,7 @@ mod real_light_and_views;
 mod real_pictures;
 mod recordings;
 mod refine;
+mod remedies;
 mod report;
 mod resume;
 mod rig;

@@ -584,10 +584,16 @@ fn what_only_pictures_can_tell_is_named_by_check() {
     assert_named("unit_m = 0.001", "[poses]");
     write_tum(&path, planned);
     // A diameter is given for the radius.
-    edit(&toml, "radius_m = 3.0", "radius_m = 6.0");
-    let said = check();
+    let wide = scratch.path().join("wide");
+    let options = ["--frames", "10", "--size", "240x180", "--seed", "2"];
+    simulate(&wide, &[&options[..], &["--supersample", "2"]].concat());
+    edit(
+        &wide.join("survey.toml"),
+        "radius_m = 3.0",
+        "radius_m = 6.0",
+    );
+    let said = succeed(&["check", text(&wide), "--json"]);
     assert!(said.contains("radius_m = 3 under [tunnel]"), "{said}");
-    std::fs::write(&toml, &right).unwrap();
     for entry in std::fs::read_dir(dir.join("frames")).unwrap() {
         let path = entry.unwrap().path();
         image::open(&path).unwrap().rotate180().save(&path).unwrap();

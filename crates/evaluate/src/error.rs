@@ -19,7 +19,7 @@ pub enum EvaluateError {
     #[error("no poses to evaluate")]
     Empty,
     /// A ray of a frame meets no wall.
-    #[error("frame {frame}, {which} pose: {source}; check the pose, or remove the frame")]
+    #[error("frame {frame}, {which} pose: {source}; correct the pose, or remove the frame")]
     Frame {
         /// Index of the frame.
         frame: usize,

@@ -84,9 +84,8 @@ pub enum RefineError {
     },
     /// Nothing overlaps.
     #[error(
-        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m \
-         and the calibration's focal length, whether the mask or tunnel.ignore leaves anything, or \
-         take frames closer together"
+        "no two frames overlap on the wall by as much as a tile, according to the initial poses, \
+         the tunnel, the calibration and the masks"
     )]
     NoOverlap,
     /// Something that is known by its shape only for a straight round tunnel.

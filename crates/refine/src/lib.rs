@@ -96,7 +96,9 @@ pub use point_fit::points_report::{PointsAxis, PointsReport, PointsSection};
 pub use points::error::PointsFitError;
 pub use points::wall_points::WallPoints;
 pub use problem::unknown_texture::UnknownTexture;
-pub use reading_search::{FittingReadings, ReadingSearchError, search_readings};
+pub use reading_search::{
+    FittingReadings, ReadingSearchError, can_search_readings, search_readings,
+};
 pub use refined::Refined;
 pub use report::{
     FrameFlag, FrameReport, HiddenBand, LevelReport, PoseReport, RefineReport, StageTime,

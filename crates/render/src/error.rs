@@ -38,8 +38,8 @@ pub enum RenderError {
     #[error(
         "the panorama would be {columns:.0} × {rows:.0} px ({:.1} Gpx, at most {:.0} are drawn): \
          {perimeter_m:.3} m around and {chainage_m:.3} m along at {px_per_metre:.1} px per metre; \
-         lower --px-per-metre, and check radius_m and the units of the poses. Frame {frame} \
-         reaches farthest: it spans {span_m:.3} m of chainage",
+         lower --px-per-metre. Frame {frame} reaches farthest: it spans {span_m:.3} m of \
+         chainage",
         columns * rows / 1e9,
         limit_px / 1e9
     )]

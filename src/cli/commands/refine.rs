@@ -14,7 +14,7 @@ use crate::cli::commands::refine_files::{
 use crate::cli::commands::refine_follow::follow;
 use crate::cli::commands::refine_memory::check_memory;
 use crate::cli::commands::refine_shards::{read_shards, write_shard};
-use crate::cli::commands::refine_summary::{print_outputs, print_summary};
+use crate::cli::commands::refine_summary::{OtherReadings, print_outputs, print_summary};
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
 };
@@ -23,7 +23,7 @@ use crate::persist::shard_number::ShardNumber;
 use crate::progress::Progress;
 use crate::refine::{
     FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, WallPoints,
-    check_input, search_readings,
+    can_search_readings, check_input, search_readings,
 };
 use crate::survey::{CalibrationGroup, Survey};
 use std::path::PathBuf;
@@ -270,13 +270,16 @@ pub fn run(
         Ok((refined.report, json, files))
     })?;
     // Frames that fit at two places, or tell too little, are read rightly.
-    if 2 * report.count_flagged(FrameFlag::Prior) > survey.frames.len() {
-        warn_of_reading(&survey, terminal)?;
-    }
+    let is_wrong = 2 * report.count_flagged(FrameFlag::Prior) > survey.frames.len();
+    let readings = if is_wrong && can_search_readings(&survey) {
+        try_readings(&survey, terminal)?
+    } else {
+        OtherReadings::Untried
+    };
     if terminal.is_json() {
         json::print_text(&json)?;
     } else {
-        print_summary(&report, arguments.verbose, terminal);
+        print_summary(&report, readings, arguments.verbose, terminal);
         if arguments.joint && !report.levels.iter().any(|level| level.joint) {
             terminal.say(
                 "  refined without --joint: the wall is smooth, so it has no detail below a pixel \
@@ -389,12 +392,13 @@ impl RefineArguments {
 
 /// Searches for a reading of poses and pictures that the frames agree with, and warns if there is
 /// one.
-fn warn_of_reading(survey: &Survey, terminal: &Terminal) -> Result<(), Failure> {
+fn try_readings(survey: &Survey, terminal: &Terminal) -> Result<OtherReadings, Failure> {
     terminal.start("readings", 1);
     let found = search_readings(survey);
     terminal.finish();
-    if let Some(found) = found? {
-        terminal.warn(found.sentence());
-    }
-    Ok(())
+    let Some(found) = found? else {
+        return Ok(OtherReadings::NoneFits);
+    };
+    terminal.warn(found.sentence());
+    Ok(OtherReadings::Named)
 }

@@ -11,8 +11,8 @@ use crate::persist::atomic::{self, OutputSet};
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::{
-    EstimatedShape, RefineInput, RefineOptions, RefineReport, Refined, ShardState, WallPoints,
-    join_shards, refine_with_checkpoint,
+    EstimatedShape, RefineError, RefineInput, RefineOptions, RefineReport, Refined, ShardState,
+    WallPoints, join_shards, refine_with_checkpoint, search_readings,
 };
 use crate::report::{OVERLAY_FILE, REFINEMENT_FILE, SECTIONS_FILE};
 use crate::surface::Bend;
@@ -101,9 +101,10 @@ pub fn stage_refined(
         ..RefineInput::from(survey)
     };
     let refined = match shards {
-        Some(shards) => join_shards(input, options, shards, checkpoint, &progress)?,
-        None => refine_with_checkpoint(input, options, checkpoint, &progress)?,
+        Some(shards) => join_shards(input, options, shards, checkpoint, &progress),
+        None => refine_with_checkpoint(input, options, checkpoint, &progress),
     };
+    let refined = refined.map_err(|error| explain(survey, error))?;
     let json = json::text(&RefineFile {
         program: PROGRAM,
         command: &record.arguments,
@@ -247,4 +248,15 @@ fn shape_files(
         .with_deviation_sigma_m(deviation_sigmas_m)
         .with_bend(bend);
     Ok((json::text(&shape_file)?, sections_csv(&sections)))
+}
+
+/// The failure of a refinement; where nothing overlaps, with the reading of the survey that
+/// neighbouring frames agree with.
+fn explain(survey: &Survey, error: RefineError) -> Failure {
+    let is_apart = matches!(error, RefineError::NoOverlap);
+    let readings = is_apart.then(|| search_readings(survey).ok().flatten());
+    match readings.flatten() {
+        Some(found) => Failure::input(format!("{error}; {}", found.sentence())),
+        None => error.into(),
+    }
 }

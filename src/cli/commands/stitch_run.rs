@@ -149,8 +149,8 @@ impl StitchRun<'_> {
         let coverage = files.coverage();
         if coverage == 0.0 {
             return Err(Failure::input(
-                "no frame covers a single pixel of the panorama; check the calibration (cx, cy) \
-                 and --px-per-metre",
+                "no frame covers a single pixel of the panorama, by the calibration (cx, cy) and \
+                 --px-per-metre",
             ));
         }
         let gaps = files.gaps(self.survey.surface.as_ref());

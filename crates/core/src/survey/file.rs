@@ -207,9 +207,26 @@ pub(super) fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
             path: path.to_owned(),
             line,
             column,
-            what: error.message().replace('\n', " "),
+            what: format!("{}{}", error.message().replace('\n', " "), slip(&text, at)),
         }
     })
+}
+
+/// The remedy of a slip at a byte where a text stops to be TOML; empty if it is none that people
+/// often make.
+fn slip(text: &str, at: usize) -> &'static str {
+    let Some((before, after)) = text.split_at_checked(at) else {
+        return "";
+    };
+    let line = before.rsplit('\n').next().unwrap_or_default();
+    let mut signs = after.chars();
+    match (signs.next(), signs.next()) {
+        (Some(','), Some('0'..='9')) => "; decimals follow a point, as in 3.0",
+        _ if line.contains('"') && line.contains('\\') => {
+            "; between double quotes, `\\` begins an escape: write `/`, or single quotes"
+        }
+        _ => "",
+    }
 }
 
 #[cfg(test)]

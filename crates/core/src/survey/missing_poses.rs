@@ -81,12 +81,12 @@ pub(super) fn complete(
             MissingPoses::Refuse => String::new(),
             MissingPoses::Interpolate => {
                 let example = first_name.map_or(String::new(), |name| {
-                    format!(", such as `{}`,", escape_controls(name))
+                    format!(
+                        "; the file names frames such as `{}`",
+                        escape_controls(name)
+                    )
                 });
-                format!(
-                    "; at least half of the frames, and two, must have one: check that the names \
-                     in the file{example} are those of the frames"
-                )
+                format!("; at least half of the frames, and two, must have one{example}")
             }
         };
         let without = poses.len() - known.len();
@@ -240,7 +240,12 @@ mod tests {
         let interpolate = MissingPoses::Interpolate;
         assert!(completed(4, &[1, 2], interpolate).is_ok());
         for (count, without, missing, expected) in [
-            (4, &[1, 2, 3][..], interpolate, "such as `a.png`, are those"),
+            (
+                4,
+                &[1, 2, 3][..],
+                interpolate,
+                "the file names frames such as `a.png`",
+            ),
             (2, &[1], interpolate, "no pose of frame 1 (1.png); at least"),
             (
                 20,

@@ -284,8 +284,10 @@ impl Survey {
             };
             let trajectory = own.trajectory();
             let poses = poses_of(&trajectory);
-            let of_camera = pose_validation::validate_poses(surface, camera, &own, &poses, path)
-                .map_err(|error| self.of_frame_of_camera(k, error))?;
+            let has_own_axes = section.camera_axes.is_some();
+            let validated =
+                pose_validation::validate_poses(surface, camera, &own, &poses, path, has_own_axes);
+            let of_camera = validated.map_err(|error| self.of_frame_of_camera(k, error))?;
             warnings.extend(of_camera);
             of_cameras.push(trajectory);
         }

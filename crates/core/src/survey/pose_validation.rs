@@ -5,7 +5,8 @@
 //! along the axis: the usual one of a sewer robot does.) In these cases other conventions are
 //! tried, the simplest first, and the plausible one is named with its flag. A wrong convention that
 //! leaves all cameras inside and looking at the wall can only be detected from the images
-//! ([`Survey::pose_readings`](crate::survey::Survey::pose_readings)).
+//! ([`Survey::pose_readings`](crate::survey::Survey::pose_readings)); and so can one by which a
+//! camera looks along the axis and rolls about it, which some do.
 
 use super::error::SurveyError;
 use super::interpreted_poses::InterpretedPoses;
@@ -64,6 +65,14 @@ impl PoseSummary {
 
     fn share(&self, count: usize) -> f64 {
         count as f64 / self.frames.max(1) as f64
+    }
+
+    /// True if the cameras look along the axis and turn about it: they roll.
+    fn rolls(&self) -> bool {
+        let turning = self.course.turning;
+        self.course.revolves
+            && self.share(self.axial) > MAX_WRONG_FRACTION
+            && turning.is_some_and(|turning| turning.y.abs() > MAX_ALIGNED_ANGLE_RAD.cos())
     }
 
     fn is_wrong(&self) -> bool {
@@ -362,16 +371,19 @@ pub(super) fn feasible_conventions(
         .collect()
 }
 
-/// Validates the poses of a file against the tunnel; returns warnings about suspicious poses.
+/// Validates the poses of a file against the tunnel; returns warnings about suspicious poses. If
+/// `has_own_axes`, the camera's axes are asked for, not those of the format.
 ///
 /// # Errors
-/// A camera outside; most cameras looking along the axis, if another convention is plausible.
+/// A camera outside; most cameras looking along the axis, if another convention is plausible,
+/// unless they roll about it as mounted.
 pub(super) fn validate_poses(
     surface: &dyn Surface,
     camera: &Camera,
     reading: &InterpretedPoses,
     poses: &[Pose],
     path: &Path,
+    has_own_axes: bool,
 ) -> Result<Vec<String>, SurveyError> {
     let stand = PoseSummary::of(surface, camera, poses);
     let lost = LostPoses::find(reading);
@@ -400,25 +412,39 @@ pub(super) fn validate_poses(
                 None if is_interpolated(reading, frame) => "the file has no pose of it, and its \
                      neighbours lead there; give it a pose, or leave it out of frames.images"
                     .to_owned(),
-                None => "check radius_m and the poses' origin, units and convention \
-                         (--pose-convention, --tunnel-frame)"
-                    .to_owned(),
+                None if stand.is_wrong() => format!(
+                    "{} of {} cameras are, and they are in every other convention and about every \
+                     other axis that was tried",
+                    stand.outside, stand.frames
+                ),
+                None => format!("{} of {} cameras are", stand.outside, stand.frames),
             },
         });
     }
     check_gaps(surface, poses, path)?;
     let mut warnings: Vec<String> = LostPoses::sentence(&lost, path).into_iter().collect();
+    let may_roll = stand.rolls() && reading.convention.camera_in_body.is_none();
+    let is_confirmed = may_roll && has_own_axes;
     if stand.is_wrong()
+        && !is_confirmed
         && let Some(other) = remedy()
     {
-        return Err(SurveyError::Association {
-            path: path.to_owned(),
-            what: format!(
-                "{} of {} cameras look along the tunnel's axis; they would look at the wall with \
-                 {other}",
-                stand.axial, stand.frames
-            ),
-        });
+        let axial = format!(
+            "{} of {} cameras look along the tunnel's axis",
+            stand.axial, stand.frames
+        );
+        if !may_roll {
+            return Err(SurveyError::Association {
+                path: path.to_owned(),
+                what: format!("{axial}; they would look at the wall with {other}"),
+            });
+        }
+        let given = reading.convention.axes.name();
+        warnings.push(format!(
+            "{}: {axial} and turn about it; if that is so, camera_axes = \"{given}\" under [poses] \
+             confirms it; they would look at the wall with {other}",
+            printed(path)
+        ));
     }
     if stand.is_suspicious() {
         let likely = remedy().map_or(String::new(), |other| {
@@ -456,8 +482,8 @@ fn check_gaps(surface: &dyn Surface, poses: &[Pose], path: &Path) -> Result<(), 
         path: path.to_owned(),
         what: format!(
             "frames {before} and {after} are {:.0} m apart along the tunnel (chainage {from_m:.1} \
-             and {to_m:.1} m), and no camera is between them; check their poses and units, or \
-             make a survey of each part",
+             and {to_m:.1} m), and no camera is between them; make a survey of each part, or give \
+             these frames other poses or other units",
             to_m - from_m
         ),
     })

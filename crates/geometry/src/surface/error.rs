@@ -34,8 +34,8 @@ pub enum SurfaceError {
     },
     /// The image's centre lies outside the lens's field of view.
     #[error(
-        "the image's centre is outside the lens's field of view; check the principal point and \
-         max_angle_deg"
+        "the image's centre is outside the lens's field of view, according to the principal point \
+         and max_angle_deg"
     )]
     NotShown,
     /// The ray or the camera's position is not a number.

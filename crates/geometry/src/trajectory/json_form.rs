@@ -8,7 +8,8 @@ const MAX_KEYS: usize = 6;
 /// Forms that are read.
 const KNOWN: &str = "JSON is read from nerfstudio and Instant NGP (`frames` with `file_path` and \
                      `transform_matrix`), Meshroom (`views` and `poses`), OpenMVG (`views` and \
-                     `extrinsics`) and OpenSfM (a list with `cameras` and `shots`)";
+                     `extrinsics`), OpenSfM (a list with `cameras` and `shots`) and Open3D (a \
+                     `PoseGraph` or `PinholeCameraTrajectory`)";
 /// The way for all others.
 const REMEDY: &str = "write the poses as one of these, or as CSV with \
                       `name,tx_m,ty_m,tz_m,qx,qy,qz,qw` in its first line, camera to world";

@@ -60,6 +60,7 @@ mod metashape;
 mod mount;
 mod nanoseconds;
 pub mod nerfstudio;
+mod open3d;
 mod openmvg;
 mod opensfm;
 mod pix4d;

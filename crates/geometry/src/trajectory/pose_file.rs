@@ -10,7 +10,7 @@ use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
 use super::{
     bundler, colmap, colmap_binary, csv, euroc, kitti, matrix_blocks, matrix_files, meshroom,
-    metashape, nerfstudio, openmvg, opensfm, pix4d, realitycapture, recorded, text, tum,
+    metashape, nerfstudio, open3d, openmvg, opensfm, pix4d, realitycapture, recorded, text, tum,
 };
 use crate::recordings::is_recording;
 use std::path::{Path, PathBuf};
@@ -132,6 +132,11 @@ fn read_text(
     options: &PoseFileOptions,
 ) -> Result<(PoseFormat, ParsedPoses), PoseError> {
     let text = text::read(path)?;
+    if matches!(options.format, None | Some(PoseFormat::Kitti))
+        && let Some(entries) = open3d::parse(path, &text)?
+    {
+        return Ok((PoseFormat::Kitti, entries.into()));
+    }
     let text = matrix_blocks::on_one_line(&text);
     let format = match options.format {
         Some(format) => format,

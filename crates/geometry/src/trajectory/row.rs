@@ -6,7 +6,7 @@ use std::borrow::Cow;
 /// Splits a row into its words, whose numbers have decimal points.
 ///
 /// Semicolons separate, else tabs, else commas, each with or without blanks, else blanks alone.
-/// Commas are decimal where semicolons or tabs separate.
+/// Commas are decimal where semicolons or tabs separate. Words may stand in quotes.
 ///
 /// # Errors
 /// Nothing between two separators other than tabs, where numbers would move to the left.
@@ -28,9 +28,18 @@ pub(super) fn words(line: &str) -> Result<Vec<Cow<'_, str>>, String> {
         ));
     }
     let words = columns.into_iter().flat_map(str::split_whitespace);
+    let words = words.map(unquoted);
     Ok(words
         .map(|word| text::with_decimal_point(word, separator))
         .collect())
+}
+
+/// A word without the quotes around it.
+fn unquoted(word: &str) -> &str {
+    let inner = word
+        .strip_prefix('"')
+        .and_then(|rest| rest.strip_suffix('"'));
+    inner.unwrap_or(word)
 }
 
 /// Splits a row into exactly N words; `form` describes them for the error message.
@@ -71,6 +80,7 @@ mod tests {
             "0,5\t-1\t2e3",
             "0,5;−1;2.000,0",
             "0.5 -1 2D3",
+            "\"0.5\",\"-1\",\"2e3\"",
         ] {
             assert_eq!(numbers(line, "a b c"), Ok([0.5, -1.0, 2e3]), "{line}");
         }

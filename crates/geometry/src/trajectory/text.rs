@@ -25,7 +25,34 @@ pub fn read(path: &Path) -> Result<String, PoseError> {
     })?;
     let mut text = decode_text(&bytes).map_err(|what| PoseError::file(path, what))?;
     text.truncate(text.trim_end_matches('\u{1a}').len());
-    Ok(text)
+    Ok(with_hashed_comments(text))
+}
+
+/// The text, whose comments before the first line with content begin with `#` where they began with
+/// `//`, or with `%` and a blank, as MATLAB writes them. (ROS writes `%time` without one.)
+fn with_hashed_comments(text: String) -> String {
+    let comment = |line: &str| {
+        let line = line.trim();
+        let rest = line.strip_prefix("//").or_else(|| line.strip_prefix('%'));
+        let is_matlab = line.starts_with("% ") || line.starts_with("%%") || line == "%";
+        rest.filter(|_| line.starts_with("//") || is_matlab)
+            .map(str::to_owned)
+    };
+    let mut head = String::new();
+    let mut rest = text.as_str();
+    while let Some((line, after)) = rest.split_once('\n') {
+        match comment(line) {
+            Some(words) => head = head + "#" + &words,
+            None if line.trim().is_empty() || line.trim().starts_with('#') => head += line,
+            None => break,
+        }
+        head.push('\n');
+        rest = after;
+    }
+    if head.is_empty() {
+        return text;
+    }
+    head + rest
 }
 
 /// The lines with content and their 1-based numbers; blank lines and comments that begin with `#`

@@ -82,12 +82,29 @@ fn parse_line(
     Ok(PoseEntry {
         camera: None,
         name: None,
-        time_s: Some(text::time(&time, unit, FORM)?),
+        time_s: Some(
+            text::time(&time, unit, FORM).map_err(|what| with_remedy_of_names(&time, what))?,
+        ),
         pose: Pose::new(
             text::rotation(order.wxyz([a, b, c, d]), order.columns())?,
             Vector3::new(tx, ty, tz),
         ),
     })
+}
+
+/// The error of a time; if the word is the name of a picture, with what reads it.
+fn with_remedy_of_names(word: &str, what: String) -> String {
+    let is_name = Path::new(word).extension().is_some_and(|extension| {
+        extension.len() > 1 && extension.to_string_lossy().starts_with(char::is_alphabetic)
+    });
+    if is_name {
+        format!(
+            "{what}; if the rows begin with names, a first line `file {}` says so",
+            &FORM[5..]
+        )
+    } else {
+        what
+    }
 }
 
 /// Formats a TUM file; every number has the digits that restore it exactly.

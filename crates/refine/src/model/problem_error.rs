@@ -13,7 +13,7 @@ pub enum ProblemError {
     #[error(transparent)]
     Frame(#[from] FrameError),
     /// A frame's pose is outside the tunnel, or its camera does not see the wall.
-    #[error("frame {frame}: {source}; check the initial poses, radius_m and the calibration")]
+    #[error("frame {frame}, by its pose, the tunnel and the calibration: {source}")]
     Placement {
         /// The frame.
         frame: usize,
@@ -22,8 +22,8 @@ pub enum ProblemError {
     },
     /// The normal equations have no solution.
     #[error(
-        "frames {first} to {last}: {source}; check that the poses are camera-to-world, radius_m, \
-         the calibration, and that [prior] is neither absurdly wide nor narrow"
+        "frames {first} to {last}: {source}; the equations of their pixels and of [prior] have no \
+         solution"
     )]
     Factor {
         /// First estimated frame.

@@ -2,6 +2,10 @@
 
 use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
 
+/// Standard errors by which evidence exceeds 0 that is not due to its scatter from pair to pair:
+/// the 95 % quantile of a normal distribution.
+const MIN_EVIDENCE_SIGMAS: f64 = 1.645;
+
 /// The second frames of the pairs; None where a frame does not fit.
 pub type Registrations = Vec<Option<Registered>>;
 
@@ -43,23 +47,29 @@ impl Comparison {
 
     /// True if a reading may be taken whose first pairs are `reading` and in which all others fit
     /// without any deviation: if its odds by priors suffice, three quarters of the pairs fit, and
-    /// three quarters of those that tell it from the one given speak for it.
+    /// those that tell it from the one given agree.
     pub fn may_take(&self, reading: &[Option<Registered>]) -> bool {
         let left = &self.of_given[reading.len()..];
         let at_best = left.iter().map(deviation);
         let evidence: Vec<f64> = self.evidence(reading).chain(at_best).collect();
         let fitting = reading.iter().flatten().count() + left.len();
-        let telling = evidence
-            .iter()
-            .zip(&self.telling)
-            .filter(|(_, tells)| **tells);
-        let all = telling.clone().count();
-        let for_it = telling
-            .filter(|(nats, _)| **nats > self.min_pair_nats)
-            .count();
         self.total_nats(&evidence) > self.least_nats
             && 4 * fitting >= 3 * self.of_given.len()
-            && 4 * for_it >= 3 * all
+            && self.agree(&evidence)
+    }
+
+    /// True if three quarters of the pairs that tell a reading from the one given speak for it, or,
+    /// where as many fit as given, too, if their evidence exceeds its scatter: the errors of poses
+    /// may turn the sign of a pair's small evidence. (Where pairs do not fit, that is large.)
+    fn agree(&self, evidence: &[f64]) -> bool {
+        let pairs = evidence.iter().zip(&self.telling);
+        let telling = pairs.filter(|(_, tells)| **tells).map(|(nats, _)| *nats);
+        let telling: Vec<f64> = telling.collect();
+        let speaks = |nats: &&f64| **nats > self.min_pair_nats;
+        let for_it = telling.iter().filter(speaks).count();
+        let fit_as_given = self.of_given.iter().flatten().count();
+        let is_small = self.min_pair_nats == 0.0 && 4 * fit_as_given >= 3 * self.of_given.len();
+        4 * for_it >= 3 * telling.len() || (is_small && exceeds_scatter(&telling))
     }
 
     /// Evidence of all pairs, nats, in which no pair that does not fit as given speaks louder for
@@ -83,6 +93,17 @@ impl Comparison {
             })
             .sum()
     }
+}
+
+/// True if evidence exceeds 0 by more than it scatters from pair to pair.
+///
+/// Source: Q. H. Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses",
+/// Econometrica 57(2), 1989.
+pub fn exceeds_scatter(evidence: &[f64]) -> bool {
+    let sum: f64 = evidence.iter().sum();
+    let mean = sum / evidence.len() as f64;
+    let squares: f64 = evidence.iter().map(|nats| (nats - mean).powi(2)).sum();
+    sum > MIN_EVIDENCE_SIGMAS * squares.sqrt()
 }
 
 /// Deviation of a frame from its prior; one that does not fit deviates by as much as that allows.
@@ -116,13 +137,39 @@ mod tests {
         };
         assert!(comparison.may_take(&[]));
         assert!(comparison.may_take(&[fits(1.0); 12]));
-        // Three quarters of the pairs must fit, and speak for it.
-        assert!(comparison.may_take(&[fits(4.0); 3]));
-        assert!(!comparison.may_take(&[fits(4.0); 4]));
+        // Three quarters of the pairs must fit.
+        assert!(comparison.may_take(&[fits(4.0); 6]));
+        assert!(!comparison.may_take(&[fits(4.0); 7]));
         assert!(!comparison.may_take(&[None; 4]));
         // A pair that does not fit costs more than the others can make up for here.
         assert!(!comparison.may_take(&[None]));
         assert!(!comparison.may_take(&[fits(2.5); 12]));
+    }
+
+    /// Less than three quarters speak for a reading, but on the whole they do; one pair alone does
+    /// not.
+    #[test]
+    fn pairs_agree_whose_evidence_exceeds_its_scatter() {
+        let given = [5.0, 6.0, 10.0, 7.0, 27.0, 16.0, 15.0, 17.0].map(fits);
+        let comparison = |min_pair_nats| Comparison {
+            of_given: given.to_vec(),
+            telling: vec![true; 8],
+            least_nats: 9.5,
+            min_pair_nats,
+        };
+        let mixed = [6.5, 1.4, 6.4, 7.4, 10.0, 17.2, 5.0, 7.9].map(fits);
+        assert!(comparison(0.0).may_take(&mixed));
+        // Of poses of other frames, each pair must tell.
+        assert!(!comparison(18.0).may_take(&mixed));
+        // Weak pictures fit by chance, or not.
+        let weak = Comparison {
+            of_given: [&[None; 3], &given[3..]].concat(),
+            ..comparison(0.0)
+        };
+        let by_chance = [5.0, 5.0, 5.0, 8.0, 28.0, 17.0, 16.0, 12.0].map(fits);
+        assert!(!weak.may_take(&by_chance));
+        let single = [6.5, 7.4, 11.4, 8.4, 0.0, 17.2, 15.0, 16.0].map(fits);
+        assert!(!comparison(0.0).may_take(&single));
     }
 
     /// Pairs with the same step in both readings must fit, and need not speak for it.

@@ -17,4 +17,4 @@ mod search;
 mod telling_pairs;
 
 pub use finding::FittingReadings;
-pub use search::{ReadingSearchError, search_readings};
+pub use search::{ReadingSearchError, can_search_readings, search_readings};

@@ -1,6 +1,6 @@
 //! The search: all readings against the one given.
 
-use super::comparison::Comparison;
+use super::comparison::{Comparison, exceeds_scatter};
 use super::finding::FittingReadings;
 use super::picture_pairs::PicturePairs;
 use super::telling_pairs::{TellingPair, telling_pairs};
@@ -15,9 +15,6 @@ const MIN_PAIRS: usize = 4;
 /// Evidence below that of the best reading with which another is named beside it, nats: odds of one
 /// to twenty.
 const MAX_DEFICIT_NATS: f64 = 3.0;
-/// Standard errors by which the evidence of pairs for the best reading exceeds that for another one
-/// that it is distinguished from: the 95 % quantile of a normal distribution.
-const MIN_TOLD_SIGMAS: f64 = 1.645;
 /// Evidence of a pair that speaks for poses of other frames, nats: half of that by which its steps
 /// differ at least.
 const MIN_SHIFT_NATS: f64 = 0.5 * MAX_DEVIATION_COST;
@@ -48,19 +45,15 @@ struct Found<'r> {
 
 impl Found<'_> {
     /// True if a reading that has more evidence is distinguished from this one: by its odds, and by
-    /// the evidence of pairs, which differs by more than it scatters (Q. H. Vuong, "Likelihood
-    /// ratio tests for model selection and non-nested hypotheses", Econometrica 57, 1989).
+    /// the evidence of pairs, which differs by more than it scatters.
     fn is_distinguished_from(&self, best: &Self) -> bool {
         if best.log_odds - self.log_odds <= MAX_DEFICIT_NATS {
             return false;
         }
         let pairs = best.pair_nats.iter().zip(&self.pair_nats);
         let differences: Vec<f64> = pairs.map(|(best, own)| best - own).collect();
-        let count = differences.len() as f64;
-        let sum: f64 = differences.iter().sum();
-        let squares: f64 = differences.iter().map(|d| (d - sum / count).powi(2)).sum();
         let is_usual = self.reading.prior_nats >= 0.0;
-        differences.is_empty() || !is_usual || sum > MIN_TOLD_SIGMAS * squares.sqrt()
+        differences.is_empty() || !is_usual || exceeds_scatter(&differences)
     }
 }
 
@@ -73,9 +66,10 @@ impl Found<'_> {
 /// another camera, by how much better it correlates. The σ of the prior are the same in all
 /// readings, also of tunnels of another radius: pictures do not measure all of a pose, and a
 /// narrower prior holds the rest closer to its prediction, right or wrong. A reading is taken if
-/// three quarters of the pairs fit and speak for it, and its odds exceed the number of readings
-/// over the survey's rate of false alarms. There may be several: poses exactly as planned, seen
-/// from the tunnel's other end, are those of another convention.
+/// three quarters of the pairs fit, if as many speak for it or their evidence exceeds its scatter,
+/// and if its odds exceed the number of readings over the survey's rate of false alarms. There may
+/// be several: poses exactly as planned, seen from the tunnel's other end, are those of another
+/// convention.
 ///
 /// Poses of other frames are compared by the pairs that tell them ([`telling_pairs`]), all other
 /// readings by pairs that are evenly distributed.
@@ -83,7 +77,7 @@ impl Found<'_> {
 /// # Errors
 /// [`ReadingSearchError`].
 pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, ReadingSearchError> {
-    if survey.cameras.is_rig() {
+    if !can_search_readings(survey) {
         return Ok(None);
     }
     let readings = survey.pose_readings()?;
@@ -98,6 +92,12 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
     Ok(name(found))
 }
 
+/// True if a survey has pairs of neighbouring frames by which readings can be compared: it has
+/// frames enough, and they are not those of a rig.
+pub fn can_search_readings(survey: &Survey) -> bool {
+    !survey.cameras.is_rig() && first_frames(survey.frames.len()).len() >= MIN_PAIRS
+}
+
 /// Readings that evenly distributed pairs agree with. Those that are improbable from the beginning
 /// compete with the others, and are tried only where one of these fits.
 fn among_all_pairs<'r>(
@@ -107,9 +107,6 @@ fn among_all_pairs<'r>(
     least_nats: f64,
 ) -> Result<Vec<Found<'r>>, RefineError> {
     let firsts = first_frames(survey.frames.len());
-    if firsts.len() < MIN_PAIRS {
-        return Ok(Vec::new());
-    }
     let mut pictures = PicturePairs::load(survey, &firsts)?;
     let mut comparison = Comparison {
         of_given: pictures.register(given, |_| true)?,

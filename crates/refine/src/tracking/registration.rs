@@ -251,9 +251,7 @@ impl<'r> Registration<'r> {
         let Some(unexplained) = Unexplained::of(&ncc_score) else {
             return Ok(None);
         };
-        let prior = self.context.prior;
-        let deviation = prior.deviation_cost(&self.predicted.pose, &estimate.pose)
-            / self.predicted.sigma_scale.powi(2);
+        let deviation = self.deviation(&estimate.pose);
         if deviation > MAX_DEVIATION_COST {
             return Ok(None);
         }
@@ -274,9 +272,15 @@ impl<'r> Registration<'r> {
         Ok(Registered {
             estimate,
             is_reliable: candidate.unexplained.is_of_right_poses(),
-            deviation: candidate.deviation,
+            deviation: self.deviation(&estimate.pose),
             log_likelihood: candidate.log_likelihood,
         })
+    }
+
+    /// Deviation of a pose from the prior's prediction, `½ eᵀΣ⁻¹e`.
+    fn deviation(&self, pose: &Pose) -> f64 {
+        let deviation = (self.context.prior).deviation_cost(&self.predicted.pose, pose);
+        deviation / self.predicted.sigma_scale.powi(2)
     }
 
     /// Solves for the frame's estimate at one pyramid level, with all other frames held; returns

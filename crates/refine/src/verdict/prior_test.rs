@@ -161,30 +161,30 @@ impl PriorTest {
 const MIN_FACTOR_SIGMAS: f64 = 3.0;
 
 impl ScaleTest {
-    /// The contradiction and its likely cause.
+    /// The contradiction, and the slip that has its factor.
     pub fn explain(&self, radius_m: f64) -> String {
         let Self { factor, sigma, .. } = self;
         if *factor < MIN_FACTOR_SIGMAS * sigma {
             return format!(
-                "refined steps do not follow the initial ones ({factor:.2} ± {sigma:.2} times \
-                 them): check the order of columns, the axes and the times of the poses"
+                "refined steps do not follow the initial ones: they are {factor:.2} ± {sigma:.2} \
+                 times as long in the same direction"
             );
         }
         let is_near = |value: f64| (factor / value).ln().abs() < 3.0 * sigma / factor + 0.05;
-        let cause = if is_near(2.0) {
-            "a diameter given for the radius?"
+        let slip = if is_near(2.0) {
+            ", as with a diameter for the radius"
         } else if is_near(0.5) {
-            "a radius given that is half of it, or steps counted twice?"
+            ", as with half the radius, or with steps counted twice"
         } else if is_near(3.2808) || is_near(0.3048) {
-            "feet for metres?"
+            ", as with feet for metres"
         } else if is_near(std::f64::consts::TAU) {
-            "a circumference given for the radius?"
+            ", as with a circumference for the radius"
         } else {
-            "check radius_m, and unit and times of the poses"
+            ""
         };
         format!(
-            "refined steps are {factor:.2} ± {sigma:.2} times the initial ones: if the poses are \
-             right, radius_m is about {:.2} ({cause})",
+            "refined steps are {factor:.2} ± {sigma:.2} times the initial ones{slip}: if the poses \
+             are right, radius_m is about {:.2}",
             radius_m / factor
         )
     }

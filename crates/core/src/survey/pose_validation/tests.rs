@@ -2,6 +2,7 @@
 
 use super::*;
 use rand::SeedableRng;
+use std::f64::consts::FRAC_PI_2;
 use tunnelstitch_geometry::surface::Circle;
 use tunnelstitch_geometry::trajectory::{
     CameraAxes, Direction, Jitter, JitterModel, PoseFormat, indexed, poses_of, spiral,
@@ -22,7 +23,9 @@ fn verdict(poses: &[Pose], given: Convention) -> Result<Vec<String>, String> {
     let surface = Circle::new(RADIUS_M).unwrap();
     let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
     let all = poses_of(&reading.trajectory());
-    validate_poses(&surface, &camera, &reading, &all, Path::new("poses.tum"))
+    let path = Path::new("poses.tum");
+    let has_own_axes = given.axes != CameraAxes::OpenCv;
+    validate_poses(&surface, &camera, &reading, &all, path, has_own_axes)
         .map_err(|error| error.to_string())
 }
 
@@ -195,7 +198,7 @@ fn one_camera_outside_is_no_convention() {
     poses[7].t_wc.x = 4.0;
     let message = verdict(&poses, tum()).unwrap_err();
     assert!(
-        message.contains("frame 7") && message.contains("check radius_m"),
+        message.contains("frame 7") && message.contains("1 of 24 cameras are"),
         "{message}"
     );
 }
@@ -209,4 +212,34 @@ fn what_only_pictures_can_tell_raises_no_alarm() {
         .map(|pose| CameraAxes::OpenGl.turn(pose))
         .collect();
     assert_eq!(verdict(&poses, tum()), Ok(vec![]));
+}
+
+/// A camera that looks ahead and rolls, or a body of ROS whose camera looks at the wall: only
+/// pictures tell. Nothing is refused, and what is said of it can be confirmed.
+#[test]
+fn cameras_that_look_ahead_and_roll_are_not_refused() {
+    let ahead: Vec<Pose> = flight(48, 0.1, 0.0, JitterModel::RandomWalk, 1.0, 3)
+        .iter()
+        .map(|pose| {
+            Pose::new(
+                pose.r_wc * so3::exp(&(-Vector3::x() * FRAC_PI_2)),
+                pose.t_wc,
+            )
+        })
+        .collect();
+    let said = verdict(&ahead, tum()).unwrap();
+    assert!(
+        said.len() == 1
+            && said[0].contains("48 of 48 cameras look along the tunnel's axis and turn about it")
+            && said[0].contains("camera_axes = \"opencv\" under [poses] confirms it"),
+        "{said:?}"
+    );
+    let gl: Vec<Pose> = (ahead.iter())
+        .map(|pose| CameraAxes::OpenGl.turn(pose))
+        .collect();
+    let own = Convention {
+        axes: CameraAxes::OpenGl,
+        ..tum()
+    };
+    assert_eq!(verdict(&gl, own), Ok(vec![]));
 }

@@ -160,8 +160,8 @@ fn validate(camera: Camera) -> Result<Camera, ParseError> {
         let [least, most] = FOCAL_SIDES.map(|sides| sides * f64::from(side_px));
         if !(least..=most).contains(&value) {
             return Err(ParseError::new(format!(
-                "{name} is {value}; for {side_px} px it must lie between {least} and {most} px: \
-                 check that it is in pixels, not in metres or millimetres"
+                "{name} is {value}; for {side_px} px it must lie between {least} and {most}, in \
+                 pixels, not in metres or millimetres"
             )));
         }
     }

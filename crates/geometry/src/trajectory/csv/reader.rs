@@ -17,6 +17,9 @@ use nalgebra::Vector3;
 use std::borrow::Cow;
 use std::path::Path;
 
+/// Extensions of pictures, in small letters.
+const PICTURE_EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
+
 pub(crate) fn parse(
     path: &Path,
     text: &str,
@@ -28,8 +31,14 @@ pub(crate) fn parse(
     };
     let fail = |number: usize| move |what: String| PoseError::line(path, number, what);
     let titles = split(header.line, header.separator).map_err(fail(header.number))?;
+    let mut columns = Columns::of(&titles, options).map_err(fail(header.number))?;
+    if columns.name.is_none() {
+        let first = header.records(text).next();
+        let first = first.and_then(|(_, line)| split(line, header.separator).ok());
+        columns.name = first.as_ref().and_then(picture_column);
+    }
     let row = RowReader {
-        columns: Columns::of(&titles, options).map_err(fail(header.number))?,
+        columns,
         count: titles.len(),
         separator: header.separator,
         time_unit: options.time_unit,
@@ -48,6 +57,18 @@ pub(crate) fn parse(
             .map_err(fail(number))?;
     }
     Ok(entries.into_parsed())
+}
+
+/// The only column with the name of a picture, whatever its title (`Bild`, `Photo ID`): without it,
+/// rows in another order than the frames would be taken for theirs.
+fn picture_column(record: &StringRecord) -> Option<usize> {
+    let is_picture = |cell: &str| {
+        let extension = cell.rsplit_once('.').map(|(_, extension)| extension);
+        let extension = extension.map(str::to_ascii_lowercase);
+        extension.is_some_and(|extension| PICTURE_EXTENSIONS.contains(&extension.as_str()))
+    };
+    let mut found = (0..record.len()).filter(|k| record.get(*k).is_some_and(is_picture));
+    found.next().filter(|_| found.next().is_none())
 }
 
 /// A reader of the rows of a table.
@@ -140,6 +161,21 @@ mod tests {
     fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
         let parsed = super::parse(path, text, &PoseFileOptions::default())?;
         Ok(parsed.entries)
+    }
+
+    #[test]
+    fn a_column_of_pictures_names_the_frames_whatever_its_title() {
+        let named = |text: &str| {
+            let read = parse(Path::new("p.csv"), text).unwrap();
+            read[0].name.clone()
+        };
+        let row = "1,2,3,0,0,0,1";
+        let text = format!("Bild,x,y,z,qx,qy,qz,qw\nC:\\a\\IMG_1.JPG,{row}\n");
+        assert_eq!(named(&text).as_deref(), Some("C:\\a\\IMG_1.JPG"));
+        // Two such columns, or none, name nothing.
+        let two = format!("a,b,x,y,z,qx,qy,qz,qw\n1.png,2.png,{row}\n");
+        assert_eq!(named(&two), None);
+        assert_eq!(named(&format!("a,x,y,z,qx,qy,qz,qw\n1.5,{row}\n")), None);
     }
 
     #[test]

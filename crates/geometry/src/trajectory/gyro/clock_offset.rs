@@ -72,7 +72,7 @@ impl ClockMatch {
         if !count.is_finite() || count > MAX_OFFSETS {
             return Err(format!(
                 "the range of {:.3} s holds {count:.0} of the log's steps of {step_s:.1e} s; \
-                 check the log's tscale, or narrow the range",
+                 narrow the range, or correct the log's tscale if it is wrong",
                 range_s[1] - range_s[0]
             ));
         }
@@ -90,7 +90,7 @@ impl ClockMatch {
             return Err(format!(
                 "the rate about the axis agrees with the plan's nowhere in the range: the \
                  greatest correlation is {correlation:.2}, \
-                 at {:.3} s; check the sensor's orientation, or widen the range",
+                 at {:.3} s",
                 offset(k)
             ));
         }
