@@ -1,6 +1,7 @@
 //! Lattice of wall samples in square tiles.
 
 use nalgebra::Vector3;
+use std::f64::consts::SQRT_2;
 use tunnelstitch_geometry::surface::{Footprint, Surface, WallFrame, WallPoint};
 
 /// Samples along the side of a tile.
@@ -44,6 +45,16 @@ impl TileId {
     /// The block of the tile.
     pub fn block(&self) -> (i64, i64) {
         (self.row.div_euclid(BLOCK), self.column.div_euclid(BLOCK))
+    }
+
+    /// True for one in about `stride` tiles, spread over all of the wall: those with the first part
+    /// of the fractions `frac(row √2 + column √3)`, which fill the unit interval evenly.
+    ///
+    /// Source: L. Kuipers and H. Niederreiter, "Uniform Distribution of Sequences", 1974.
+    pub fn is_one_in(&self, stride: usize) -> bool {
+        const SQRT_3: f64 = 1.732_050_807_568_877_2;
+        let sum = self.row as f64 * SQRT_2 + self.column as f64 * SQRT_3;
+        (sum - sum.floor()) * (stride as f64) < 1.0
     }
 }
 
@@ -201,6 +212,24 @@ mod tests {
         };
         let [a, b] = [0.0072, 0.0072 * 1.0001].map(|size_m| of_size(size_m).centre(far));
         assert_eq!((a.s_m, a.h_m), (b.s_m, b.h_m));
+    }
+
+    #[test]
+    fn one_in_some_tiles_is_spread_over_all_of_the_wall() {
+        for stride in [1, 8, 64] {
+            let count = |rows: std::ops::Range<i64>| -> usize {
+                let tiles = rows.flat_map(|row| (0..80).map(move |column| TileId { column, row }));
+                tiles.filter(|tile| tile.is_one_in(stride)).count()
+            };
+            for first in [-3000, -7, 0, 90_000] {
+                let expected = 80 * 60 / stride;
+                let found = count(first..first + 60);
+                assert!(
+                    found.abs_diff(expected) <= expected / 10,
+                    "{stride}: {found}"
+                );
+            }
+        }
     }
 
     #[test]
