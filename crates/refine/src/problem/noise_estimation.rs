@@ -169,12 +169,12 @@ impl PhotometricProblem<'_> {
         Ok(OutlierMask::new(self.grid, misfits.concat()))
     }
 
-    /// Applies `work` to `count` to twice as many tiles spread over all of the wall, or to all tiles
-    /// if there are fewer, at the initial estimates. Returns the results of all chunks of tiles,
-    /// always in the same order.
+    /// Applies `work` to `count` to twice as many tiles, spread over all of the wall, or to all of
+    /// them if there are fewer, at the initial estimates. Returns the results of all chunks of
+    /// tiles, always in the same order.
     ///
-    /// The tiles are chosen by their places: two problems on the same lattice have the same ones,
-    /// and so the same noise and the same typical misfits, even if some other tiles are observed.
+    /// The tiles are chosen by their places: problems on the same lattice have the same ones, and
+    /// so the same noise and the same typical misfits, even if some other tiles are observed.
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
