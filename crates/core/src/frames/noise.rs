@@ -43,7 +43,8 @@ impl NoiseMeasurement {
 /// `n² = (G (n² + t²) − (n² + G t²))/(G − 1)`,   `G = 4`.
 ///
 /// Source: D. J. Field, "Relations between the statistics of natural images and the response
-/// properties of cortical cells", Journal of the Optical Society of America A 4(12), 1987 (spectra).
+/// properties of cortical cells", Journal of the Optical Society of America A 4(12), 1987 (the
+/// spectra).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PictureNoise {
     /// That of the finest detail.

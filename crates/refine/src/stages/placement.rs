@@ -76,8 +76,8 @@ pub struct ReportParts {
 
 impl Placement {
     /// Aligns the estimates with the initial poses along the gauge, tests the prior, and gives all
-    /// frames that are neither photometric nor uncertain their poses by it. If the prior contradicts
-    /// the lengths, no frame is photometric.
+    /// frames that are neither photometric nor uncertain their poses by it. If the prior
+    /// contradicts the lengths, no frame is photometric.
     pub fn new(
         setup: &Setup,
         datum: &Datum,

@@ -311,8 +311,8 @@ mod tests {
     }
 
     /// Ramps in uncorrelated noise, seen by two frames, in two lights: the slopes of the filtered
-    /// tiles have a smaller error than those of the noisy ones, and `φ̂²` is on average `φ̂φ`, in the
-    /// dark as in the light.
+    /// tiles have a smaller error than those of the noisy ones, and `φ̂²` is on average `φ̂φ`, in
+    /// the dark as in the light.
     #[test]
     fn filtered_slopes_are_nearer_to_the_truth_and_their_squares_unbiased() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);

@@ -42,9 +42,9 @@ pub fn sort_candidates(candidates: &mut [Candidate]) {
 ///
 /// Among those whose unexplained shares are too similar for the pixels to decide, the prior
 /// chooses. If its margin is too small for a candidate elsewhere on the wall, the frame is
-/// ambiguous.
-/// `by_chance`: log-likelihood that candidates of noise hardly exceed; `pixel_size_m` tells how large a pixel of the search level is on the wall where a candidate
-/// looks.
+/// ambiguous. `by_chance`: log-likelihood that candidates hardly exceed where there is nothing but
+/// noise; `pixel_size_m` tells how large a pixel of the search level is on the wall where a
+/// candidate looks.
 ///
 /// # Errors
 /// The reason to reject the frame.

@@ -72,7 +72,8 @@ pub fn min_samples(unwrapped: &UnwrappedFrame) -> f64 {
 }
 
 /// Log-likelihood that the greatest of so many correlations of noise exceeds with the probability
-/// `alpha`: `ℓ ≈ ½ z²` of a normal deviate z, which exceeds z with a probability below `exp(−½ z²)`.
+/// `alpha` at the most: `ℓ ≈ ½ z²` of a normal deviate, that exceeds z with a probability below
+/// `exp(−½ z²)`.
 pub fn log_likelihood_by_chance(correlations: usize, alpha: f64) -> f64 {
     (correlations as f64 / alpha).ln()
 }

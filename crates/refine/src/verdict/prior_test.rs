@@ -1,8 +1,8 @@
 //! Test of the prior: refined steps against initial ones.
 //!
 //! The prior says how far the initial poses are off. Where frames are placed by their pixels, their
-//! refined poses show how far they are: errors e of the steps of a random walk, or of the poses themselves,
-//! each with the variance σ² that the prior states, less what the refined pose is uncertain by.
+//! refined poses show how far they are: errors e of the steps of a random walk, or of the poses
+//! themselves, each with the variance σ² that the prior states, less what the refined pose is uncertain by.
 //!
 //! - **Scale.** Pictures show lengths in units of the radius only, so a radius that is wrong makes
 //!   all refined steps d wrong by one factor. With the initial steps `d̂` its estimate is
@@ -92,8 +92,8 @@ struct PriorError {
 }
 
 impl PriorTest {
-    /// Tests the prior on the frames that are placed. `estimates` and `covariances` are aligned with
-    /// the initial poses along the gauge; `radius_m`: as given; `alpha`: rate of false alarms.
+    /// Tests the prior on the frames that are placed. `estimates` and `covariances` are aligned
+    /// with the initial poses along the gauge; `radius_m`: as given; `alpha`: rate of false alarms.
     pub fn new(
         prior: &Prior,
         (datum, radius_m): (&Datum, f64),
