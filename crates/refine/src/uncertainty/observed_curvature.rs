@@ -11,8 +11,9 @@
 //! over the poses and the wall's shape: without that of the shape, a change of the poses' score
 //! would look like a large motion along what the pixels hardly tell apart. Over all unknowns of all
 //! frames, what single tiles contribute by chance averages out, so a share of the tiles is enough.
-//! κ is about 0.9 for Gaussian residuals, as weights fall where residuals grow (`ψ' ≤ ω`), and far less where the slopes of a faint wall
-//! are noise: then the score hardly changes, and the estimate is much less certain than H says.
+//! κ is about 0.9 for Gaussian residuals, as weights fall where residuals grow (`ψ' ≤ ω`), and far
+//! less where the slopes of a faint wall are noise: then the score hardly changes, and the estimate
+//! is much less certain than H says.
 //!
 //! What the score changes by beyond this, `d = g(x + δ) − g(x) − κ (H − P) δ`, is that of the
 //! noise: samples that move by a pixel have other noise, and so has their product with slopes that

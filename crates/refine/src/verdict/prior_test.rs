@@ -2,7 +2,8 @@
 //!
 //! The prior says how far the initial poses are off. Where frames are placed by their pixels, their
 //! refined poses show how far they are: errors e of the steps of a random walk, or of the poses
-//! themselves, each with the variance σ² that the prior states, less what the refined pose is uncertain by.
+//! themselves, each with the variance σ² that the prior states, less what the refined pose is
+//! uncertain by.
 //!
 //! - **Scale.** Pictures show lengths in units of the radius only, so a radius that is wrong makes
 //!   all refined steps d wrong by one factor. With the initial steps `d̂` its estimate is
