@@ -245,8 +245,7 @@ impl From<InspectError> for Failure {
             InspectError::TooLong { .. } | InspectError::NoViewer | InspectError::Listen { .. } => {
                 Self::usage(error.to_string())
             }
-            InspectError::Part(_)
-            | InspectError::Marks { .. }
+            InspectError::Marks { .. }
             | InspectError::MarkConflict { .. }
             | InspectError::Folder { .. } => Self::input(error.to_string()),
         }

@@ -58,9 +58,8 @@ pub fn run<'a>(
     state.frames.estimates.clone_from(&solution.unknowns.frames);
     state.kappa = solution.unknowns.kappa;
     shape::take_over(setup, state, &solution);
-    let is_dense = plan.sampling.variance_weighting;
-    let is_rescaled = may_learn_shape(state) && shape::learn(setup, state, &solution, is_dense);
-    if is_rescaled && !has_solve_ahead(state) {
+    let is_last = !has_solve_ahead(state);
+    if may_learn_shape(state) && shape::learn(setup, state, &solution, is_last) && is_last {
         plan_again(&plan, setup.options, state);
     }
     solution.remove_tested();
