@@ -15,13 +15,11 @@ use crate::frames::{FrameError, PictureOrientation, Video};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::recordings::is_recording;
+use tunnelstitch_geometry::trajectory::csv::PICTURE_EXTENSIONS;
 use tunnelstitch_geometry::trajectory::gyro::gopro_readout_ms;
 use tunnelstitch_geometry::trajectory::{
     DuplicateTimes, PoseEntry, PoseFile, PoseFileOptions, read_poses_with,
 };
-
-/// Extensions of pictures.
-const PICTURE_EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
 
 /// Extensions of videos.
 const VIDEO_EXTENSIONS: [&str; 7] = ["mp4", "mov", "m4v", "mkv", "avi", "webm", "mts"];

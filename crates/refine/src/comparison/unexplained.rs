@@ -17,12 +17,13 @@ pub struct Unexplained {
 }
 
 impl Unexplained {
-    /// The shares by a normalised cross-correlation; None if the two do not correlate.
-    pub fn of(ncc_score: &NccScore) -> Option<Self> {
+    /// The shares by a normalised cross-correlation; None if the two share fewer than `min_samples`
+    /// samples, or do not correlate.
+    pub fn of(ncc_score: &NccScore, min_samples: f64) -> Option<Self> {
         let unexplained = |correlation: f64| (1.0 - correlation.powi(2)).max(MIN_UNEXPLAINED);
         let contrast = ncc_score.correlation();
         let texture = ncc_score.corrected_correlation();
-        (contrast > 0.0).then(|| Self {
+        (ncc_score.samples >= min_samples && contrast > 0.0).then(|| Self {
             texture: unexplained(texture.unwrap_or(1.0)),
             contrast: unexplained(contrast),
             is_drowned: texture.is_none(),
@@ -78,6 +79,10 @@ mod tests {
         score
     }
 
+    fn of(c: f32, noise: f32) -> Option<Unexplained> {
+        Unexplained::of(&compared(c, noise), 4.0)
+    }
+
     #[test]
     fn matches_have_at_least_half_the_odds() {
         let odds = |unexplained: f64| (1.0 - unexplained) / unexplained;
@@ -91,22 +96,23 @@ mod tests {
 
     #[test]
     fn shares_follow_from_the_correlation() {
-        let found = Unexplained::of(&compared(0.6, 0.25)).unwrap();
+        let found = of(0.6, 0.25).unwrap();
         assert!((found.contrast - 0.64).abs() < 1e-6, "{found:?}");
         assert!((found.texture - 0.36).abs() < 1e-6, "{found:?}");
         assert!((found.correlation() - 0.8).abs() < 1e-6);
         assert!(!found.is_of_right_poses());
         // A match that differs from a perfect one by noise alone is no worse.
-        let perfect = Unexplained::of(&compared(0.75, 0.25)).unwrap();
+        let perfect = of(0.75, 0.25).unwrap();
         assert_eq!(perfect.texture, MIN_UNEXPLAINED);
         assert!(perfect.is_of_right_poses());
-        assert!(Unexplained::of(&compared(-0.1, 0.25)).is_none());
+        assert!(of(-0.1, 0.25).is_none());
+        assert!(Unexplained::of(&compared(0.6, 0.25), 5.0).is_none());
     }
 
     /// By the contrast where noise drowns the texture; by the texture where its share is known.
     #[test]
     fn matches_are_told_by_texture_and_by_contrast() {
-        let of = |c: f32, noise: f32| Unexplained::of(&compared(c, noise)).unwrap();
+        let of = |c: f32, noise: f32| of(c, noise).unwrap();
         let drowned = of(0.3, 0.95);
         assert!(drowned.is_drowned);
         assert_eq!(drowned.texture, MIN_UNEXPLAINED);

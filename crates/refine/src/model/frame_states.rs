@@ -96,6 +96,14 @@ pub fn is_placed(rejection: &Option<RejectionReason>) -> bool {
     rejection.as_ref().is_none_or(RejectionReason::is_uncertain)
 }
 
+/// Rejects all frames that their pixels place.
+pub fn reject_placed(rejections: &mut [Option<RejectionReason>], reason: &RejectionReason) {
+    let placed = rejections
+        .iter_mut()
+        .filter(|rejection| is_placed(rejection));
+    placed.for_each(|rejection| *rejection = Some(reason.clone()));
+}
+
 /// Finds out whether most of the frames that show something fit each other, and are placed.
 ///
 /// # Errors

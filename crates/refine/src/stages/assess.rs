@@ -3,7 +3,7 @@
 use crate::comparison::inconsistent_frames::FrameComparison;
 use crate::error::RefineError;
 use crate::model::context::EstimationContext;
-use crate::model::frame_states::{FrameStates, is_placed, majority};
+use crate::model::frame_states::{FrameStates, majority, reject_placed};
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS, Calibration, Kappa};
@@ -178,16 +178,6 @@ fn judge(
     }
     if let Err(reason) = majority(rejections) {
         reject_placed(rejections, &reason);
-    }
-}
-
-/// Rejects all frames that are not rejected yet, and those that are for being uncertain.
-fn reject_placed(rejections: &mut [Option<RejectionReason>], reason: &RejectionReason) {
-    for rejection in rejections
-        .iter_mut()
-        .filter(|rejection| is_placed(rejection))
-    {
-        *rejection = Some(reason.clone());
     }
 }
 

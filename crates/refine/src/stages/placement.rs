@@ -1,6 +1,6 @@
 //! Final poses: those of frames that their pixels place as solved, all others by the prior.
 
-use crate::model::frame_states::is_placed;
+use crate::model::frame_states::{is_placed, reject_placed};
 use crate::model::rejection::RejectionReason;
 use crate::options::Photometry;
 use crate::parameters::calibration::Datum;
@@ -111,11 +111,11 @@ impl Placement {
         );
         if let Some(scale) = prior_test.contradicting_scale() {
             let factor = scale.factor;
-            for (rejection, placed) in rejections.iter_mut().zip(&mut placed) {
-                if std::mem::take(placed) {
-                    *rejection = Some(RejectionReason::ContradictsScale { factor });
-                }
-            }
+            reject_placed(
+                &mut rejections,
+                &RejectionReason::ContradictsScale { factor },
+            );
+            placed.fill(false);
         }
         for rejection in rejections.iter_mut().flatten() {
             if let RejectionReason::Ambiguous { other, .. } = rejection {

@@ -245,10 +245,8 @@ impl<'r> Registration<'r> {
         let ncc_score = self
             .mosaic
             .compute_ncc(self.context, &self.unwrapped, &estimate.pose);
-        if ncc_score.samples < min_samples(&self.unwrapped) {
-            return Ok(None);
-        }
-        let Some(unexplained) = Unexplained::of(&ncc_score) else {
+        let unexplained = Unexplained::of(&ncc_score, min_samples(&self.unwrapped));
+        let Some(unexplained) = unexplained else {
             return Ok(None);
         };
         let deviation = self.deviation(&estimate.pose);

@@ -1,6 +1,5 @@
 //! Search for aliases: gauge motions after which a frame matches the wall as well as it does now.
 
-use crate::comparison::ncc_score::NccScore;
 use crate::comparison::unexplained::Unexplained;
 use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::context::EstimationContext;
@@ -67,12 +66,12 @@ pub fn find_alias_motions(
         unwrapped: &unwrapped,
         pose: &pose,
     };
-    let texture_share = comparison.ncc_score([0.0; 2]).texture_share();
-    let Some(present) = comparison.unexplained([0.0; 2]) else {
+    let ncc_score = mosaic.compute_ncc(context, &unwrapped, &pose);
+    let Some(present) = Unexplained::of(&ncc_score, min_samples(&unwrapped)) else {
         return Ok(Vec::new());
     };
     let min_squared_correlation =
-        MIN_SQUARED_CORRELATION_LEFT * present.min_squared_correlation(texture_share);
+        MIN_SQUARED_CORRELATION_LEFT * present.min_squared_correlation(ncc_score.texture_share());
     let shifts = find_matching_shifts(&mosaic, &unwrapped, &pose, reach_m, min_squared_correlation);
     let spacing_m = mosaic.grid.spacing_m;
     let mut motions = Vec::new();
@@ -121,18 +120,12 @@ impl Comparison<'_> {
         gauge_component(self.context.surface.as_ref(), self.pose, &shift_m.into())
     }
 
-    /// Correlation with the mosaic at a shift on the wall.
-    fn ncc_score(&self, shift_m: [f64; 2]) -> NccScore {
-        let pose = self.motion(shift_m).1.apply(self.pose);
-        self.mosaic.compute_ncc(self.context, self.unwrapped, &pose)
-    }
-
     /// Unexplained shares at a shift on the wall; None if too few samples are shared, or the two do
     /// not correlate.
     fn unexplained(&self, shift_m: [f64; 2]) -> Option<Unexplained> {
-        let ncc_score = self.ncc_score(shift_m);
-        let is_compared = ncc_score.samples >= min_samples(self.unwrapped);
-        Unexplained::of(&ncc_score).filter(|_| is_compared)
+        let pose = self.motion(shift_m).1.apply(self.pose);
+        let ncc_score = self.mosaic.compute_ncc(self.context, self.unwrapped, &pose);
+        Unexplained::of(&ncc_score, min_samples(self.unwrapped))
     }
 
     /// Refines a shift to a fraction of a sample by pattern search: the best of ever closer

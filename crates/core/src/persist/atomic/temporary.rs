@@ -29,8 +29,7 @@ const MAX_REMOVAL_ATTEMPTS: usize = 20;
 struct Listed(PathBuf);
 
 impl Listed {
-    fn new(path: &Path) -> Self {
-        let mut list = hold_list();
+    fn new(list: &mut Vec<PathBuf>, path: &Path) -> Self {
         list.push(path.to_owned());
         Self(path.to_owned())
     }
@@ -100,9 +99,11 @@ pub(super) fn file_in(folder: &Path) -> io::Result<TemporaryFile> {
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     loop {
+        // Held from before the file exists: an interruption in between would leave it.
+        let mut list = hold_list();
         let (file, path) = builder.tempfile_in(folder)?.into_parts();
         if lock_new(&file, &path) {
-            let _listed = Listed::new(&path);
+            let _listed = Listed::new(&mut list, &path);
             return Ok(TemporaryFile {
                 file,
                 path,
@@ -137,6 +138,8 @@ impl TemporaryFolder {
 pub(super) fn folder_in(parent: &Path) -> io::Result<TemporaryFolder> {
     remove_abandoned(parent);
     loop {
+        // As in `file_in`.
+        let mut list = hold_list();
         let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(parent)?;
         // Some systems cannot open folders; there, folders are never removed as abandoned either.
         let lock = File::open(folder.path()).ok();
@@ -145,7 +148,7 @@ pub(super) fn folder_in(parent: &Path) -> io::Result<TemporaryFolder> {
             .is_none_or(|lock| lock_new(lock, folder.path()))
         {
             return Ok(TemporaryFolder {
-                _listed: Listed::new(folder.path()),
+                _listed: Listed::new(&mut list, folder.path()),
                 _lock: lock,
                 folder,
             });

@@ -29,6 +29,7 @@ pub use cells::{from_cell, to_cell};
 pub(super) use columns::FORM;
 pub(super) use header::Header;
 pub use pose_column::{ColumnMap, PoseColumn};
+pub use reader::PICTURE_EXTENSIONS;
 pub(super) use reader::parse;
 pub(super) use table::{separator, split};
 pub use writer::format;

@@ -17,8 +17,8 @@ use nalgebra::Vector3;
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Extensions of pictures, in small letters.
-const PICTURE_EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
+/// Extensions of pictures that are read, in small letters.
+pub const PICTURE_EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
 
 pub(crate) fn parse(
     path: &Path,
