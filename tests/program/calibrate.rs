@@ -81,7 +81,7 @@ fn a_wrong_focal_length_is_found_and_the_result_is_a_survey() {
 fn a_survey_without_calibration_is_refined() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    let options = ["--frames", "20", "--size", "200x150", "--k1", "-0.1"];
+    let options = ["--frames", "30", "--size", "200x150", "--k1", "-0.1"];
     simulate(&survey, &options);
     let truth = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
     scale_focal(&survey, 1.3);

@@ -306,7 +306,7 @@ fn wall_that_moves_is_ignored_whether_or_not_it_is_named() {
             // Waves that run along with the camera, half as fast again, a tenth of a metre long.
             let at = Vector2::new(wall.s_m, wall.h_m - 1.5 * y);
             let wave = (63.0 * at.y + 9.0 * at.x).sin() + (41.0 * at.x - 17.0 * at.y).sin();
-            let is_pool = (0.4..1.4).contains(&wall.h_m);
+            let is_pool = (0.5..1.1).contains(&wall.h_m);
             is_pool.then_some((110.0 + 40.0 * wave) as u8)
         }
     });
@@ -321,7 +321,7 @@ fn wall_that_moves_is_ignored_whether_or_not_it_is_named() {
     edit(
         &path.join("survey.toml"),
         "radius_m = 3.0\n",
-        "radius_m = 3.0\nignore = [{ theta_deg = [130, 230], chainage_m = [0.3, 1.5] }]\n",
+        "radius_m = 3.0\nignore = [{ theta_deg = [130, 230], chainage_m = [0.4, 1.2] }]\n",
     );
     let named = refined(&path);
     assert_right(&named);

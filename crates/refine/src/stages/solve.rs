@@ -65,7 +65,7 @@ pub fn run<'a>(
     solution.remove_tested();
     solution.tie_gauge();
     let uncertainty = uncertainty_of(setup, &context, state, &mut solution)?;
-    let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
+    let unobservable = find_unobservable(setup, state, uncertainty.as_ref());
     let mut kappa = state.kappa;
     for parameter in &unobservable {
         kappa[parameter.unknown] = 0.0;
@@ -290,20 +290,12 @@ fn uncertainty_of(
 /// The shared parameters that a full-size solution does not observe.
 fn find_unobservable(
     setup: &Setup,
-    context: &EstimationContext,
     state: &PipelineState,
-    solution: &Solution,
     uncertainty: Option<&SolutionUncertainty>,
 ) -> Vec<UnobservableParameter> {
     let calibration = setup.calibration_at(state);
     match uncertainty.filter(|_| setup.calibration.has_free_parameters()) {
-        Some(uncertainty) => uncertainty.find_unobservable(
-            &context.at(solution.unknowns.kappa),
-            &calibration,
-            &solution.unknowns.frames,
-            &state.frames.rejections,
-            setup.options.max_sigma_px,
-        ),
+        Some(uncertainty) => uncertainty.find_unobservable(&calibration, &state.frames.rejections),
         None => Vec::new(),
     }
 }

@@ -31,7 +31,8 @@ pub struct SolutionUncertainty {
     pub registration_px: Vec<f64>,
     /// Errors beyond noise, if the residuals show any.
     pub model_error: Option<ModelErrorReport>,
-    /// Covariance `Σ_κ` of the shared parameters, where they were estimated.
+    /// Covariance `Σ_κ` of the shared parameters, where they were estimated, with the square of the
+    /// step that was left of the solve.
     pub shared: Option<SharedBlock>,
     /// Overdispersion of every frame; 0 for those that show nothing.
     pub overdispersions: Vec<Overdispersion>,
@@ -89,17 +90,19 @@ impl SolutionUncertainty {
                 if let (Some(shared), Some(errors)) = (&mut shared, &errors) {
                     *shared += errors.draws.of_shared();
                 }
-                // The draws of what is not seen have what the shared parameters do to frames.
+                let left = step_left(solution, &factor, curvature)?;
+                // The draws of what is not seen, and the step left, have what the shared parameters
+                // do to frames.
                 let of_shared = posterior.zip(shared);
                 if let Some(shared) = &mut shared {
                     let square = |draw: &UnseenError| draw.shared * draw.shared.transpose();
-                    *shared += unseen.mean(square);
+                    *shared += unseen.mean(square) + left.1 * left.1.transpose();
                 }
                 Some(TotalCovariance {
                     of_noise,
                     errors,
                     unseen: unseen.clone(),
-                    left: step_left(solution, &factor, curvature)?,
+                    left,
                     shared: of_shared.map(|(posterior, shared)| (posterior.w.clone(), shared)),
                 })
             }
@@ -158,15 +161,11 @@ impl SolutionUncertainty {
     }
 
     /// Finds the shared parameters that the data do not observe. All are unobservable if too many
-    /// frames do not fit the others, or if they are tied too loosely.
-    /// `context`: with the solution's own κ.
+    /// frames do not fit the others.
     pub fn find_unobservable(
         &self,
-        context: &EstimationContext,
         calibration: &Calibration,
-        estimates: &[FrameEstimate],
         rejections: &[Option<RejectionReason>],
-        max_sigma_px: f64,
     ) -> Vec<UnobservableParameter> {
         let Some(posterior) = &self.posterior else {
             return Vec::new();
@@ -180,20 +179,6 @@ impl SolutionUncertainty {
             let reason = format!(
                 "{misfits} of {count} frames do not fit the others, so the rest may fit in wrong \
                  places; give better poses or a better calibration, or estimate less at once"
-            );
-            return mark_all_unobservable(calibration, &reason);
-        }
-        let sigmas = (0..count)
-            .filter(|k| rejections[*k].is_none())
-            .map(|k| self.frame_sigma(context, k, &estimates[k]).wall_px);
-        let mut sigmas: Vec<f64> = sigmas.collect();
-        sigmas.sort_unstable_by(f64::total_cmp);
-        let median = sigmas.get(sigmas.len() / 2).copied().unwrap_or(f64::NAN);
-        if median.is_nan() || median > max_sigma_px {
-            let reason = format!(
-                "the frames are certain to {median:.2} px of the wall only (1-σ), and more than \
-                 {max_sigma_px} px leave the camera to chance; use more frames, best a \
-                 whole turn or two, or more of a wall with texture"
             );
             return mark_all_unobservable(calibration, &reason);
         }
