@@ -6,6 +6,7 @@ use crate::model::significance::chi_squared_bounds;
 use crate::parameters::calibration::{
     BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa, SHARED_PARAMETERS,
 };
+use crate::parameters::frame_estimate::FrameEstimate;
 use crate::parameters::shape::{Shape, ShapeModel, ShapeStep};
 use crate::parameters::shape_limits::{
     FIRST_FINEST_COLUMNS, MAX_PRIOR_SIGMAS, MAX_STRENGTH_SIGMAS, with_finer_lattice,
@@ -61,23 +62,35 @@ pub fn begin(setup: &Setup, state: &mut PipelineState) -> Result<(), ProblemErro
     Ok(())
 }
 
-/// Takes over the shape of a solution.
-pub fn take_over(setup: &Setup, state: &mut PipelineState, solution: &Solution) {
-    if let Some(shape) = state.shape.take() {
-        let solved = Shape {
-            coefficients: solution.unknowns.shape.clone(),
-            ..shape
-        };
-        adopt(setup, state, solved);
-    }
+/// Shared parameters κ and frames where a solve begins.
+pub type Start = (Kappa, Vec<FrameEstimate>);
+
+/// Takes over the unknowns of a solution; false if its shape is not adopted.
+pub fn take_over(
+    setup: &Setup,
+    state: &mut PipelineState,
+    solution: &Solution,
+    start: &Start,
+) -> bool {
+    let solved = &solution.unknowns;
+    state.frames.estimates.clone_from(&solved.frames);
+    state.kappa = solved.kappa;
+    let shape = state.shape.take().map(|shape| Shape {
+        coefficients: solved.shape.clone(),
+        ..shape
+    });
+    shape.is_none_or(|shape| adopt(setup, state, shape, start))
 }
 
-/// Adopts a shape. One far beyond its prior means that something else is wrong: then the wall and
-/// the lens are those given, or the wall that fits measured points.
-fn adopt(setup: &Setup, state: &mut PipelineState, mut shape: Shape) {
+/// Adopts a shape. One far beyond its prior means that something else is wrong: then it returns
+/// false, the wall and the lens are those given, or the wall that fits measured points, and the
+/// frames where they were at the start, for it has bent their poses, too.
+fn adopt(setup: &Setup, state: &mut PipelineState, mut shape: Shape, start: &Start) -> bool {
     let most_m = MAX_PRIOR_SIGMAS * setup.shape_sigma_m;
     let is_plausible = |block: &ShapeStep| (0.0..=most_m).contains(&block.amax());
-    if !shape.coefficients.iter().all(is_plausible) {
+    let is_adopted = shape.coefficients.iter().all(is_plausible);
+    if !is_adopted {
+        (state.kappa, state.frames.estimates) = start.clone();
         shape.model.scales.clear();
         shape.model.dropped.clear();
         shape.coefficients.clear();
@@ -88,6 +101,7 @@ fn adopt(setup: &Setup, state: &mut PipelineState, mut shape: Shape) {
         fix_shared(setup, state);
     }
     state.shape = Some(shape);
+    is_adopted
 }
 
 /// Fixes the shared parameters that were not asked for at their given values.
@@ -102,8 +116,14 @@ fn fix_shared(setup: &Setup, state: &mut PipelineState) {
 
 /// Learns the strengths of the shape at a full-size solution, and whether the lens differs from the
 /// given one, and the tunnel from a straight one. Returns true if that changes anything; the state
-/// is then where the new solve should end. `is_last`: no other solve is certain to follow.
-pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_last: bool) -> bool {
+/// is then where the new solve should end, or at the start if the shape is not adopted. `start`: of
+/// the solve; `is_last`: no other solve is certain to follow.
+pub fn learn(
+    setup: &Setup,
+    state: &mut PipelineState,
+    (solution, start): (&Solution, &Start),
+    is_last: bool,
+) -> bool {
     let most_m = MAX_STRENGTH_SIGMAS * setup.shape_sigma_m;
     let alpha = match is_last {
         true => setup.options.false_alarm_rate,
@@ -152,7 +172,7 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution, is_l
             *estimate = stepped;
         }
     }
-    adopt(setup, state, shape);
+    adopt(setup, state, shape, start);
     true
 }
 

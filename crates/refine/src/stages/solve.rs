@@ -54,12 +54,12 @@ pub fn run<'a>(
     if problem.tiles() == 0 && state.frames.rejections.iter().all(Option::is_none) {
         return Ok(estimation);
     }
+    let start = (state.kappa, state.frames.estimates.clone());
     let mut solution = solve(&plan, problem, setup, state, session)?;
-    state.frames.estimates.clone_from(&solution.unknowns.frames);
-    state.kappa = solution.unknowns.kappa;
-    shape::take_over(setup, state, &solution);
     let is_last = !has_solve_ahead(state);
-    if may_learn_shape(state) && shape::learn(setup, state, &solution, is_last) && is_last {
+    let has_changed = !shape::take_over(setup, state, &solution, &start)
+        || may_learn_shape(state) && shape::learn(setup, state, (&solution, &start), is_last);
+    if has_changed && is_last {
         plan_again(&plan, setup.options, state);
     }
     solution.remove_tested();
