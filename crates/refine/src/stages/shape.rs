@@ -214,3 +214,69 @@ fn is_rescaled(before: &ShapeModel, after: &ShapeModel) -> bool {
                     || !(1.0 / MAX_STRENGTH_CHANGE..MAX_STRENGTH_CHANGE).contains(&ratio)
             })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::RefineInput;
+    use crate::options::RefineOptions;
+    use crate::stages;
+    use image::DynamicImage;
+    use nalgebra::{UnitQuaternion, Vector3};
+    use std::sync::Arc;
+    use tunnelstitch_core::frames::FrameSet;
+    use tunnelstitch_geometry::camera::Camera;
+    use tunnelstitch_geometry::surface::Circle;
+    use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose, StampedPose};
+
+    /// Poses of frames along the tunnel, displaced along it.
+    fn poses(displaced_m: f64) -> Vec<Pose> {
+        let place = |k: i32| Vector3::new(0.0, 0.1 * f64::from(k) + displaced_m, 0.0);
+        let pose = |k| Pose::new(UnitQuaternion::identity(), place(k));
+        (0..4).map(pose).collect()
+    }
+
+    /// A shape within ten times its prior takes its frames along; one beyond that does not.
+    #[test]
+    fn frames_go_back_where_a_shape_is_not_believed() {
+        let stamped = |(k, pose)| StampedPose {
+            time_s: k as f64,
+            pose,
+        };
+        let initial: Vec<_> = poses(0.0).into_iter().enumerate().map(stamped).collect();
+        let frames = FrameSet::in_memory(initial.iter().map(|_| DynamicImage::new_luma8(64, 48)));
+        let prior = Jitter {
+            model: JitterModel::Independent,
+            rotation_sigma_rad: 0.05,
+            translation_sigma_m: [0.05; 3],
+        };
+        let camera = Camera::from_vertical_fov(64, 48, 1.0);
+        let circle = Arc::new(Circle::new(3.0).unwrap());
+        let input = RefineInput::new(camera, circle, &frames, &initial, prior);
+        let options = RefineOptions::default();
+        let setup = Setup::new(input, &options).unwrap();
+        let estimates = |displaced_m| -> Vec<FrameEstimate> {
+            let poses = poses(displaced_m).into_iter();
+            poses.map(FrameEstimate::at).collect()
+        };
+        for (sigmas, is_believed) in [(9.0, true), (11.0, false)] {
+            let mut state = stages::begin::begin(&setup);
+            state.frames.estimates = estimates(0.0);
+            let start = (state.kappa, state.frames.estimates.clone());
+            begin(&setup, &mut state).unwrap();
+            let mut shape = state.shape.clone().unwrap();
+            assert!(!shape.coefficients.is_empty());
+            for block in &mut shape.coefficients {
+                block.fill(sigmas * setup.shape_sigma_m);
+            }
+            state.frames.estimates = estimates(0.02);
+            assert_eq!(adopt(&setup, &mut state, shape, &start), is_believed);
+            let place_m = state.frames.estimates[1].pose.t_wc.y;
+            let expected_m = if is_believed { 0.12 } else { 0.1 };
+            assert!((place_m - expected_m).abs() < 1e-12, "{place_m}");
+            let adopted = state.shape.unwrap();
+            assert_eq!(adopted.coefficients.is_empty(), !is_believed);
+            assert_eq!(adopted.model.scales.is_empty(), !is_believed);
+        }
+    }
+}
