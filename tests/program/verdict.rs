@@ -52,7 +52,7 @@ fn a_survey_in_which_nothing_matches_ends_early() {
         &survey,
         &["--frames", "20", "--size", "160x120", "--seed", "4"],
     );
-    blur_pictures(&survey.join("frames"), 8.0);
+    blur_pictures(&survey.join("frames"), 16.0);
     let message = fail(&["refine", text(&survey), "--out", text(&out)], 4);
     assert!(message.contains("it was not tried"), "{message}");
     let report = json(&out.join("refine.json"));
