@@ -23,7 +23,8 @@ use crate::uncertainty::observed_curvature::observe_curvature;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::validation::disagreement::reject_disagreeing_frames;
 
-/// Solves after which the strengths of the shape are not learned again.
+/// Solves after which none is repeated for the shape: its strengths are not learned again, and one
+/// that is not adopted, as measured points may make it each time, is solved for no more.
 const MAX_LEARNING_SOLVES: usize = 4;
 
 /// Runs the stage; a snapshot may be kept between two steps.
@@ -57,8 +58,9 @@ pub fn run<'a>(
     let start = (state.kappa, state.frames.estimates.clone());
     let mut solution = solve(&plan, problem, setup, state, session)?;
     let is_last = !has_solve_ahead(state);
-    let has_changed = !shape::take_over(setup, state, &solution, &start)
-        || may_learn_shape(state) && shape::learn(setup, state, (&solution, &start), is_last);
+    let is_adopted = shape::take_over(setup, state, &solution, &start);
+    let has_changed = may_learn_shape(state)
+        && (!is_adopted || shape::learn(setup, state, (&solution, &start), is_last));
     if has_changed && is_last {
         plan_again(&plan, setup.options, state);
     }
@@ -300,7 +302,7 @@ fn find_unobservable(
     }
 }
 
-/// True if the strengths of the shape are learned after this solve: after the first few.
+/// True if this solve may be repeated for what is learned of the shape: the first few may.
 fn may_learn_shape(state: &PipelineState) -> bool {
     state.levels.len() < MAX_LEARNING_SOLVES
 }
