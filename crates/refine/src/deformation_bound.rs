@@ -18,7 +18,7 @@ use crate::linear::sparse_cholesky::Factor;
 use crate::model::context::FrameWindow;
 use crate::options::RefineOptions;
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameEstimate};
-use crate::parameters::shape::{HARMONIC_ORDERS, ShapeModel, ShapeStep};
+use crate::parameters::shape::{ShapeModel, ShapeStep};
 use crate::parameters::shape_limits::FIRST_FINEST_COLUMNS;
 use crate::problem::assumed_texture::AssumedTexture;
 use crate::problem::photometric_problem::PhotometricProblem;
@@ -43,6 +43,8 @@ const MAX_ROWS: usize = 8;
 /// Shorter side of the pictures to which information is assigned, pixels: it is spread over the
 /// whole picture, whatever its size.
 const SHORTER_SIDE: u32 = 60;
+/// Harmonics of the section whose amplitude is bounded, from the ovality on.
+const HARMONIC_ORDERS: usize = 4;
 /// Right sides that are solved for at once.
 const BATCH: usize = 16;
 

@@ -9,7 +9,8 @@
 //!
 //! | scale | functions φ |
 //! | --- | --- |
-//! | harmonics | cos mθ and sin mθ, m = 2 … 5, constant along the tunnel: ovality |
+//! | ovality | cos 2θ and sin 2θ, constant along the tunnel |
+//! | harmonics | cos mθ and sin mθ, m = 3 … 5, constant along the tunnel |
 //! | lattices of 8, 16, 32, … columns | cubic B-splines: undulations of a quarter of the perimeter and shorter |
 //!
 //! Each lattice has half the spacing of the one before, so that the sum is a B-spline on the
@@ -18,7 +19,8 @@
 //!
 //! Coefficients come in blocks of eight, as many as a frame has parameters, so that the normal
 //! equations have blocks of one size ([`crate::linear::normal_equations`]): neighbours in a row of
-//! a lattice, or the eight harmonics.
+//! a lattice, or the harmonics of a scale, and then coefficients of no function, which stay at
+//! their prior.
 //!
 //! Source: C. K. Chui, "An Introduction to Wavelets", 1992 (splines of halved spacing); D. J. C.
 //! MacKay, "Bayesian interpolation", Neural Computation 4(3), 1992 (strengths by evidence).
@@ -36,20 +38,31 @@ const BLOCK_FUNCTIONS: usize = FRAME_PARAMETERS;
 const MIN_COLUMNS: usize = BLOCK_FUNCTIONS;
 /// Harmonics of a section that are hardly seen: its mean, cos θ and sin θ.
 const WEAK_HARMONICS: usize = 3;
-/// Orders of the harmonics, cos mθ and sin mθ of each.
-pub const HARMONIC_ORDERS: usize = BLOCK_FUNCTIONS / 2;
-/// Order m of the first harmonic. Those of order 0 and 1 are the radius and the position of the
-/// axis.
-const FIRST_HARMONIC: usize = 2;
+/// The section's ovality. A lining is flattened by the ground more than it has any other harmonic,
+/// so it has a strength of its own.
+pub const OVALITY: Functions = Functions::Harmonics {
+    first_order: 2,
+    orders: 1,
+};
+/// The harmonics above it.
+const HIGHER_HARMONICS: Functions = Functions::Harmonics {
+    first_order: 3,
+    orders: 3,
+};
 
 /// A block of coefficients, metres, or a step of them.
 pub type ShapeStep = SVector<f64, BLOCK_FUNCTIONS>;
 
 /// Functions whose coefficients have one strength.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Functions {
-    /// cos mθ and sin mθ, m = 2 … 5, constant along the tunnel.
-    Harmonics,
+    /// cos mθ and sin mθ, constant along the tunnel, for some orders m.
+    Harmonics {
+        /// Smallest order.
+        first_order: usize,
+        /// Number of orders, four at the most.
+        orders: usize,
+    },
     /// Cubic B-splines on a lattice.
     Lattice {
         /// Columns around the section, a multiple of eight.
@@ -65,7 +78,7 @@ impl Functions {
     /// Number of blocks of coefficients.
     pub fn blocks(&self) -> usize {
         match *self {
-            Self::Harmonics => 1,
+            Self::Harmonics { .. } => 1,
             Self::Lattice { columns, rows, .. } => rows * columns / BLOCK_FUNCTIONS,
         }
     }
@@ -73,31 +86,37 @@ impl Functions {
     /// Root mean square over the wall of a displacement by functions of strength 1.
     ///
     /// A cubic B-spline has the square integral 151/315 in either direction; at any angle
-    /// `Σ_m cos² mθ + sin² mθ = 4`.
+    /// `cos² mθ + sin² mθ = 1`.
     pub fn rms(&self) -> f64 {
         match *self {
-            Self::Harmonics => 2.0,
+            Self::Harmonics { orders, .. } => (orders as f64).sqrt(),
             Self::Lattice { .. } => 151.0 / 315.0,
         }
     }
 
     /// Number of coefficients that [`Functions::retain_deformation`] leaves.
     pub fn deformations(&self) -> usize {
-        let all = BLOCK_FUNCTIONS * self.blocks();
         match *self {
-            Self::Harmonics => all,
-            Self::Lattice { rows, .. } => all - WEAK_HARMONICS * rows,
+            Self::Harmonics { orders, .. } => 2 * orders,
+            Self::Lattice { columns, rows, .. } => (columns - WEAK_HARMONICS) * rows,
         }
     }
 
     /// Removes mean, cos θ and sin θ from every row of coefficients, given as blocks with a vector
-    /// in each column: as radius and position of the axis, these are hardly seen.
+    /// in each column: as radius and position of the axis, these are hardly seen. Also removes the
+    /// coefficients of no function.
     pub fn retain_deformation<const C: usize>(
         &self,
         blocks: &mut [SMatrix<f64, BLOCK_FUNCTIONS, C>],
     ) {
-        let Self::Lattice { columns, .. } = *self else {
-            return;
+        let columns = match *self {
+            Self::Harmonics { orders, .. } => {
+                for block in blocks {
+                    block.rows_range_mut(2 * orders..).fill(0.0);
+                }
+                return;
+            }
+            Self::Lattice { columns, .. } => columns,
         };
         let weight = |harmonic: usize, column: usize| {
             let theta = TAU * column as f64 / columns as f64;
@@ -169,8 +188,7 @@ pub struct FunctionValue {
 }
 
 impl ShapeModel {
-    /// Harmonics and lattices of 8, 16, … up to `finest` columns, all of the strength `sigma_m`,
-    /// for the wall between two chainages, metres; `origin`: node of the lattices.
+    /// Harmonics and lattices of 8, 16, … up to `finest` columns, all of the strength `sigma_m`, for the wall between two chainages, metres; `origin`: node of the lattices.
     pub fn new(
         perimeter_m: f64,
         origin: WallPoint,
@@ -179,7 +197,8 @@ impl ShapeModel {
         sigma_m: f64,
     ) -> Self {
         let mut model = Self::empty(perimeter_m, origin, extent_h_m);
-        model.add(Functions::Harmonics, sigma_m);
+        model.add(OVALITY, sigma_m);
+        model.add(HIGHER_HARMONICS, sigma_m);
         let mut columns = MIN_COLUMNS;
         while columns <= finest {
             model.add(model.lattice_of(columns), sigma_m);
@@ -271,12 +290,15 @@ impl ShapeModel {
         let mut first = 0;
         for scale in &self.scales {
             match scale.functions {
-                Functions::Harmonics => {
+                Functions::Harmonics {
+                    first_order,
+                    orders,
+                } => {
                     let theta = TAU * (wall.s_m - self.origin.s_m) / self.perimeter_m;
-                    values.extend((0..BLOCK_FUNCTIONS).map(|component| FunctionValue {
+                    values.extend((0..2 * orders).map(|component| FunctionValue {
                         block: first,
                         component,
-                        value: harmonic(component, theta),
+                        value: harmonic(first_order, component, theta),
                     }));
                 }
                 Functions::Lattice {
@@ -342,7 +364,7 @@ impl ShapeModel {
             .scales
             .iter()
             .filter_map(|scale| match scale.functions {
-                Functions::Harmonics => None,
+                Functions::Harmonics { .. } => None,
                 Functions::Lattice { columns, .. } => Some((columns, scale.sigma_m)),
             });
         lattices.max_by_key(|(columns, _)| *columns)
@@ -364,9 +386,10 @@ impl ShapeModel {
     }
 }
 
-/// The harmonic of a block's component: cos mθ for even ones, sin mθ for odd ones.
-fn harmonic(component: usize, theta: f64) -> f64 {
-    let angle = (FIRST_HARMONIC + component / 2) as f64 * theta;
+/// The harmonic of a block's component: cos mθ for even ones, sin mθ for odd ones; `first_order`:
+/// m of the first two.
+fn harmonic(first_order: usize, component: usize, theta: f64) -> f64 {
+    let angle = (first_order + component / 2) as f64 * theta;
     if component.is_multiple_of(2) {
         angle.cos()
     } else {
@@ -415,27 +438,36 @@ impl Shape {
             }
             columns *= 2;
         }
-        let harmonics = self.harmonics(finest);
-        match (field, harmonics) {
-            (Some(field), Some(harmonics)) => Some(field.plus(&harmonics)),
-            (field, harmonics) => field.or(harmonics),
+        for (scale, range) in model.scales.iter().zip(model.ranges()) {
+            let Functions::Harmonics {
+                first_order,
+                orders,
+            } = scale.functions
+            else {
+                continue;
+            };
+            let amplitudes = &self.coefficients[range.start].as_slice()[..2 * orders];
+            let own = self.harmonics(first_order, amplitudes, finest);
+            field = Some(match field {
+                Some(sum) => sum.plus(&own),
+                None => own,
+            });
         }
+        field
     }
 
-    /// The harmonics, as a B-spline on a lattice; None if the model has none.
+    /// Harmonics of some amplitudes, metres, as a B-spline on a lattice; `first_order`: m of the
+    /// first two.
     ///
     /// The spline with the coefficients `cos mθ_i / β` at the nodes, `β = (2 + cos(2π m/n))/3`,
     /// interpolates cos mθ there.
-    fn harmonics(&self, columns: usize) -> Option<RadialField> {
-        let mut scales = self.model.scales.iter().zip(self.model.ranges());
-        let (_, range) = scales.find(|(s, _)| s.functions == Functions::Harmonics)?;
-        let block = &self.coefficients[range.start];
+    fn harmonics(&self, first_order: usize, amplitudes: &[f64], columns: usize) -> RadialField {
         let value = |column: usize| -> f64 {
             let step = TAU / columns as f64;
-            let terms = block.iter().enumerate().map(|(component, amplitude)| {
-                let order = (FIRST_HARMONIC + component / 2) as f64;
+            let terms = amplitudes.iter().enumerate().map(|(component, amplitude)| {
+                let order = (first_order + component / 2) as f64;
                 let beta = (2.0 + (order * step).cos()) / 3.0;
-                amplitude * harmonic(component, column as f64 * step) / beta
+                amplitude * harmonic(first_order, component, column as f64 * step) / beta
             });
             terms.sum()
         };
@@ -444,7 +476,7 @@ impl Shape {
         let [from, to] = self.model.extent_h_m;
         let rows = lattice.rows_between(from, to);
         let coefficients = rows.clone().flat_map(|_| row.clone()).collect();
-        Some(RadialField::new(lattice, rows.start, coefficients))
+        RadialField::new(lattice, rows.start, coefficients)
     }
 
     /// The shape after a step.
@@ -503,6 +535,10 @@ mod tests {
             assert!((block - of(0.0, k)).norm() < 1e-12);
         }
         assert_eq!(functions.deformations(), 32 - 6);
+        let mut block = [ShapeStep::repeat(1.0)];
+        OVALITY.retain_deformation(&mut block);
+        assert_eq!(block[0].sum(), 2.0);
+        assert_eq!(OVALITY.deformations(), 2);
     }
 
     #[test]
@@ -520,21 +556,17 @@ mod tests {
     #[test]
     fn functions_of_strength_one_have_the_stated_size() {
         let model = ShapeModel::new(18.0, WallPoint::default(), [0.0, 9.0], 8, 1.0);
-        let (mut harmonics, mut lattice) = (0.0, 0.0);
+        let mut squares = [0.0; 3];
         for k in 0..1000 {
             let wall = WallPoint {
                 s_m: 0.37 * f64::from(k),
                 h_m: 3.0 + 0.0023 * f64::from(k),
             };
             for function in model.functions_at(wall) {
-                let sum = match function.block {
-                    0 => &mut harmonics,
-                    _ => &mut lattice,
-                };
-                *sum += function.value * function.value / 1000.0;
+                squares[function.block.min(2)] += function.value * function.value / 1000.0;
             }
         }
-        for (scale, square) in model.scales.iter().zip([harmonics, lattice]) {
+        for (scale, square) in model.scales.iter().zip(squares) {
             assert!((scale.functions.rms() / f64::sqrt(square) - 1.0).abs() < 0.01);
         }
     }

@@ -1,6 +1,6 @@
 //! Prior of a wall whose deformation is a known random field.
 
-use crate::parameters::shape::{Functions, ShapeModel};
+use crate::parameters::shape::{OVALITY, ShapeModel};
 use tunnelstitch_geometry::surface::WallPoint;
 
 /// Distance of the nodes of a lattice over the length ℓ of a field with the correlation
@@ -28,7 +28,7 @@ impl WallPrior {
         let mut model = ShapeModel::empty(perimeter_m, WallPoint::default(), extent_h_m);
         if self.ovality_m > 0.0 {
             // The mean square of cos² and sin² is a half each.
-            model.add(Functions::Harmonics, self.ovality_m * 0.5f64.sqrt());
+            model.add(OVALITY, self.ovality_m * 0.5f64.sqrt());
         }
         if self.undulation_m > 0.0 {
             let spacing_m = SPACING_PER_LENGTH * self.undulation_length_m;

@@ -50,11 +50,13 @@ pub fn join_shapes(empty: ShapeModel, stretches: &[WallStretch], origin: WallPoi
             sigma_m: 1.0,
         };
         coefficients.extend(match functions {
-            Functions::Harmonics => vec![harmonics(&model.with_only(scale), stretches, &fields)],
+            Functions::Harmonics { .. } => {
+                vec![harmonics(&model.with_only(scale), stretches, &fields)]
+            }
             Functions::Lattice { .. } => lattice(&model, functions, stretches, &fields, origin),
         });
     }
-    let seen: Vec<usize> = kinds(stretches, kept);
+    let seen: Vec<Functions> = kinds(stretches, kept);
     let dropped = |stretch: &WallStretch| stretch.shape.model.dropped.clone();
     for kind in kinds(stretches, dropped)
         .into_iter()
@@ -63,7 +65,7 @@ pub fn join_shapes(empty: ShapeModel, stretches: &[WallStretch], origin: WallPoi
         // The evidence of all falls by the sum of what it falls by in each, as the fourth power.
         let falls = stretches.iter().flat_map(|stretch| {
             let limits = stretch.shape.model.dropped.iter();
-            let limits = limits.filter(|scale| columns_of(scale) == kind);
+            let limits = limits.filter(|scale| kind_of(scale) == kind);
             limits.map(|scale| stretch.own_share * scale.sigma_m.powi(-4))
         });
         let sum: f64 = falls.sum();
@@ -79,46 +81,51 @@ pub fn join_shapes(empty: ShapeModel, stretches: &[WallStretch], origin: WallPoi
     }
 }
 
-/// Columns of a scale's lattice; 0 for the harmonics.
-fn columns_of(scale: &Scale) -> usize {
+/// The functions of a scale, wherever along the tunnel: a lattice has no rows.
+fn kind_of(scale: &Scale) -> Functions {
     match scale.functions {
-        Functions::Harmonics => 0,
-        Functions::Lattice { columns, .. } => columns,
+        Functions::Lattice { columns, .. } => Functions::Lattice {
+            columns,
+            first_row: 0,
+            rows: 0,
+        },
+        harmonics => harmonics,
     }
 }
 
-/// The kinds of scales that any stretch has, by ascending [`columns_of`].
-fn kinds(stretches: &[WallStretch], scales: impl Fn(&WallStretch) -> Vec<Scale>) -> Vec<usize> {
+/// The kinds of scales that any stretch has ([`kind_of`]), harmonics first, then lattices by
+/// ascending columns.
+fn kinds(stretches: &[WallStretch], scales: impl Fn(&WallStretch) -> Vec<Scale>) -> Vec<Functions> {
     let all = stretches.iter().flat_map(scales);
-    let mut kinds: Vec<usize> = all.map(|scale| columns_of(&scale)).collect();
+    let mut kinds: Vec<Functions> = all.map(|scale| kind_of(&scale)).collect();
     kinds.sort_unstable();
     kinds.dedup();
     kinds
 }
 
 /// The functions of a kind over all of the wall.
-fn functions_of(model: &ShapeModel, kind: usize) -> Functions {
+fn functions_of(model: &ShapeModel, kind: Functions) -> Functions {
     match kind {
-        0 => Functions::Harmonics,
-        columns => model.lattice_functions(columns as f64),
+        Functions::Lattice { columns, .. } => model.lattice_functions(columns as f64),
+        harmonics => harmonics,
     }
 }
 
 /// Strength of a kind in a stretch, metres; 0 if it has none.
-fn strength_m(stretch: &WallStretch, kind: usize) -> f64 {
+fn strength_m(stretch: &WallStretch, kind: Functions) -> f64 {
     let mut scales = stretch.shape.model.scales.iter();
-    let scale = scales.find(|scale| columns_of(scale) == kind);
+    let scale = scales.find(|scale| kind_of(scale) == kind);
     scale.map_or(0.0, |scale| scale.sigma_m)
 }
 
 /// The displacement of a stretch by the functions of one kind, in the gauge of all.
-fn field_of_scale(stretch: &WallStretch, kind: usize) -> Option<RadialField> {
+fn field_of_scale(stretch: &WallStretch, kind: Functions) -> Option<RadialField> {
     let Shape {
         model,
         coefficients,
     } = stretch.shape;
     let mut scales = model.scales.iter().zip(model.ranges());
-    let (scale, range) = scales.find(|(scale, _)| columns_of(scale) == kind)?;
+    let (scale, range) = scales.find(|(scale, _)| kind_of(scale) == kind)?;
     let alone = Shape {
         model: model.with_only(*scale),
         coefficients: coefficients[range].to_vec(),
@@ -184,6 +191,7 @@ fn lattice(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parameters::shape::OVALITY;
     use std::f64::consts::TAU;
 
     const PERIMETER_M: f64 = 3.0 * TAU;
@@ -195,7 +203,7 @@ mod tests {
     /// A smooth shape on the lattices of a stretch that is displaced by `by`.
     fn shape(extent_h_m: [f64; 2], by: WallPoint) -> Shape {
         let mut model = model(extent_h_m);
-        model.add(Functions::Harmonics, 0.004);
+        model.add(OVALITY, 0.004);
         model.add(model.lattice_functions(32.0), 0.002);
         let Functions::Lattice {
             first_row, rows, ..

@@ -478,7 +478,7 @@ mod tests {
         let mut normal = NormalEquations::zeros(&pattern);
         normal.add_block(&pattern, 0, 0, &Block::identity());
         let mut truth = vec![ShapeStep::zeros(); blocks];
-        for block in &mut truth[ranges[2].clone()] {
+        for block in &mut truth[ranges[3].clone()] {
             *block = ShapeStep::from_fn(|_, _| 0.005 * normal_number());
         }
         for (k, c) in truth.iter().enumerate() {
@@ -531,9 +531,9 @@ mod tests {
         let scales = &learned.model.scales;
         assert_eq!(scales.len(), 1, "{scales:?}");
         assert!((scales[0].sigma_m / 0.005 - 1.0).abs() < 0.15, "{scales:?}");
-        let errors = learned.coefficients.iter().zip(&truth[ranges[2].clone()]);
+        let errors = learned.coefficients.iter().zip(&truth[ranges[3].clone()]);
         let square: f64 = errors.map(|(c, truth)| (c - truth).norm_squared()).sum();
-        let rms_m = (square / (8 * ranges[2].len()) as f64).sqrt();
+        let rms_m = (square / (8 * ranges[3].len()) as f64).sqrt();
         assert!((0.8e-3..1.1e-3).contains(&rms_m), "{rms_m}");
     }
 }

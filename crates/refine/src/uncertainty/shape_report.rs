@@ -47,10 +47,14 @@ pub struct ShapeReport {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ScaleReport {
-    /// Distance of the nodes of its lattice, metres; none for the harmonics (ovality), which are
-    /// constant along the tunnel.
+    /// Distance of the nodes of its lattice, metres; none for harmonics, which are constant along
+    /// the tunnel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spacing_m: Option<f64>,
+    /// First and last order m of its harmonics cos mθ and sin mθ, 2 being the ovality; none for a
+    /// lattice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub harmonics: Option<[usize; 2]>,
     /// Its strength: 1-σ of its coefficients, as learned from the frames, millimetres.
     pub sigma_mm: f64,
 }
@@ -59,9 +63,12 @@ pub struct ScaleReport {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct UnseenScaleReport {
-    /// Distance of the nodes of its lattice, metres; none for the harmonics (ovality).
+    /// Distance of the nodes of its lattice, metres; none for harmonics.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spacing_m: Option<f64>,
+    /// First and last order of its harmonics; none for a lattice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub harmonics: Option<[usize; 2]>,
     /// Displacement over the wall, root mean square, millimetres, that would have been seen: less
     /// than the false-alarm rate of all such walls show nothing.
     pub below_mm: f64,
@@ -196,15 +203,24 @@ impl ShapeReport {
     /// Reports the scales of a model and the shape estimated with them.
     pub fn new(model: &ShapeModel, estimated: Option<&EstimatedShape>) -> Self {
         let spacing_m = |scale: &Scale| match scale.functions {
-            Functions::Harmonics => None,
+            Functions::Harmonics { .. } => None,
             Functions::Lattice { columns, .. } => Some(model.spacing_m(columns)),
+        };
+        let harmonics = |scale: &Scale| match scale.functions {
+            Functions::Harmonics {
+                first_order,
+                orders,
+            } => Some([first_order, first_order + orders - 1]),
+            Functions::Lattice { .. } => None,
         };
         let scale = |scale: &Scale| ScaleReport {
             spacing_m: spacing_m(scale),
+            harmonics: harmonics(scale),
             sigma_mm: 1e3 * scale.sigma_m,
         };
         let unseen = |scale: &Scale| UnseenScaleReport {
             spacing_m: spacing_m(scale),
+            harmonics: harmonics(scale),
             below_mm: 1e3 * scale.functions.rms() * scale.sigma_m,
         };
         let rms_mm = |values: &[f64]| {
