@@ -19,6 +19,12 @@ const OPTION_VARIABLES: &str = "TUNNELSTITCH_";
 /// Variable with the number of threads, on which no result depends.
 const THREADS_VARIABLE: &str = "TUNNELSTITCH_THREADS";
 
+/// Variables of the C library of Linux that return memory to the system once it is free, instead of
+/// keeping it in pieces: without them a task has a fifth more at its peak. Bytes.
+const ALLOCATOR_VARIABLES: [&str; 2] = ["MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"];
+/// Their value: allocations that large are few and take long to fill.
+const ALLOCATOR_THRESHOLD: &str = "1048576";
+
 /// Identifiers of the processes that run.
 static RUNNING: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
 
@@ -68,6 +74,7 @@ pub fn run_process(
         .args(arguments)
         .current_dir(folder)
         .env(THREADS_VARIABLE, cores.to_string())
+        .envs(ALLOCATOR_VARIABLES.map(|name| (name, ALLOCATOR_THRESHOLD)))
         .stdin(Stdio::null())
         .stdout(output.try_clone()?)
         .stderr(output);

@@ -168,9 +168,12 @@ impl PhotometricProblem<'_> {
         Ok(OutlierMask::new(self.grid, misfits.concat()))
     }
 
-    /// Applies `work` to about `count` tiles spread over all of the wall, or to all tiles if there
-    /// are fewer, at the initial estimates. Returns the results of all chunks of tiles, always in
-    /// the same order.
+    /// Applies `work` to `count` to twice as many tiles, spread over all of the wall, or to all of
+    /// them if there are fewer, at the initial estimates. Returns the results of all chunks of
+    /// tiles, always in the same order.
+    ///
+    /// The tiles are chosen by their places: problems on the same lattice have the same ones, and
+    /// so the same noise and the same typical misfits, even if some other tiles are observed.
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
@@ -179,14 +182,15 @@ impl PhotometricProblem<'_> {
         count: usize,
         work: impl Fn(&mut T, &mut ObservedTile) + Sync,
     ) -> Result<Vec<T>, ProblemError> {
-        let stride = (self.coverage.tiles / count).max(1);
+        let stride = previous_power_of_two(self.coverage.tiles / count);
         let mut gathered = Vec::new();
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch);
             let participants = self.coverage.frames(stretch);
             let pyramids = self.images.load(participants)?;
             let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
-            let tiles: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
+            let tiles = visibility.tiles.iter();
+            let tiles: Vec<&Tile> = tiles.filter(|tile| tile.id.is_one_in(stride)).collect();
             let chunks = tiles.par_chunks(TILES_PER_TASK).map(|tiles| {
                 let mut gathered = T::default();
                 let mut workspace = TileWorkspace::default();
@@ -213,6 +217,11 @@ impl PhotometricProblem<'_> {
         }
         Ok(gathered)
     }
+}
+
+/// The largest power of two up to a number, at least 1.
+fn previous_power_of_two(number: usize) -> usize {
+    1 << number.max(1).ilog2()
 }
 
 /// A tile with its observers.
