@@ -123,7 +123,7 @@ impl<'a> JointBlock<'a> {
         let frames = visibility.frames(block);
         let region = region_around(grid, tiles);
         let shift = fractions(region.column, region.row);
-        let spacing_m = [grid.spacing_m, grid.spacing_m];
+        let spacing_m = [grid.spacing_s_m, grid.spacing_h_m];
         let lattice = FineGrid {
             columns: grid.columns * TILE as i64,
             spacing_m,

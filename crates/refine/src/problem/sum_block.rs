@@ -221,7 +221,7 @@ impl PhotometricProblem<'_> {
             variance_weighting: self.sampling.variance_weighting,
             denoiser: self.denoiser.as_ref(),
         };
-        ((self.grid.spacing_m, self.grid.spacing_m), weighting)
+        ((self.grid.spacing_s_m, self.grid.spacing_h_m), weighting)
     }
 
     /// The shape's functions at some tiles; none if the shape is not estimated or has no functions.

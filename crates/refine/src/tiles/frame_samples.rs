@@ -289,8 +289,8 @@ mod tests {
         for (k, value) in values[..AREA].iter().enumerate() {
             let (i, j) = ((k % SIDE) as f64 - 4.5, (k / SIDE) as f64 - 4.5);
             let wall = WallPoint {
-                s_m: centre.s_m + i * grid.spacing_m,
-                h_m: centre.h_m + j * grid.spacing_m,
+                s_m: centre.s_m + i * grid.spacing_s_m,
+                h_m: centre.h_m + j * grid.spacing_h_m,
             };
             let x_w = circle.frame(wall).x_w;
             let pixel = camera.project(&estimate.pose.to_camera(&x_w)).unwrap();

@@ -24,8 +24,10 @@ pub const BLOCK: i64 = 8;
 /// A regular lattice on the unrolled wall; a whole number of tiles goes around the section.
 #[derive(Clone, Copy, Debug)]
 pub struct WallGrid {
-    /// Distance between samples along s and h, metres.
-    pub spacing_m: f64,
+    /// Distance between samples along s, metres.
+    pub spacing_s_m: f64,
+    /// Distance between samples along h, metres.
+    pub spacing_h_m: f64,
     /// Tiles around the section.
     pub columns: i64,
     /// Samples per pixel along each axis, at the distance that the lattice was laid out for.
@@ -72,24 +74,35 @@ pub fn fractions(column: i64, row: i64) -> [f64; 2] {
 }
 
 impl WallGrid {
-    /// A square lattice with about `density` samples per pixel width of `pixel_size_m` on the wall.
-    ///
-    /// Its spacing is the one of a whole number of tiles around the section: poses that are a
-    /// little different have the same lattice, kilometres along the tunnel.
+    /// A lattice with about `density` samples per pixel width of `pixel_size_m` on the wall.
     pub fn new(surface: &dyn Surface, pixel_size_m: f64, density: f64) -> Self {
-        let perimeter_m = surface.perimeter_m();
-        let tiles = perimeter_m * density / (pixel_size_m * TILE as f64);
+        let spacing_m = pixel_size_m / density;
+        let tiles = surface.perimeter_m() / (spacing_m * TILE as f64);
         let columns = (tiles.round() as i64).max(1);
         Self {
-            spacing_m: perimeter_m / (columns as f64 * TILE as f64),
+            spacing_s_m: surface.perimeter_m() / (columns as f64 * TILE as f64),
+            spacing_h_m: spacing_m,
             columns,
             density,
         }
     }
 
+    /// The lattice with the spacing along s along h, too: poses that are a little different, and
+    /// with them the size of a pixel, have the same one, kilometres along the tunnel.
+    #[must_use]
+    pub fn squared(self) -> Self {
+        Self {
+            spacing_h_m: self.spacing_s_m,
+            ..self
+        }
+    }
+
     /// Width and height of a tile, metres.
     pub fn tile_size_m(&self) -> (f64, f64) {
-        (self.spacing_m * TILE as f64, self.spacing_m * TILE as f64)
+        (
+            self.spacing_s_m * TILE as f64,
+            self.spacing_h_m * TILE as f64,
+        )
     }
 
     /// The tile of this lattice that contains the centre of a tile of another one on the same wall.
@@ -113,8 +126,8 @@ impl WallGrid {
         let (column, row) = (tile.column as f64, tile.row as f64);
         let [along_s, along_h] = fractions(tile.column, tile.row);
         WallPoint {
-            s_m: (column + 0.5) * width + (along_s - 0.5) * self.spacing_m,
-            h_m: (row + 0.5) * height + (along_h - 0.5) * self.spacing_m,
+            s_m: (column + 0.5) * width + (along_s - 0.5) * self.spacing_s_m,
+            h_m: (row + 0.5) * height + (along_h - 0.5) * self.spacing_h_m,
         }
     }
 
@@ -123,8 +136,8 @@ impl WallGrid {
         let centre = self.centre(tile);
         let reach = 0.5 * (SIDE - 1) as f64;
         (
-            std::array::from_fn(|i| centre.s_m + (i as f64 - reach) * self.spacing_m),
-            std::array::from_fn(|j| centre.h_m + (j as f64 - reach) * self.spacing_m),
+            std::array::from_fn(|i| centre.s_m + (i as f64 - reach) * self.spacing_s_m),
+            std::array::from_fn(|j| centre.h_m + (j as f64 - reach) * self.spacing_h_m),
         )
     }
 
@@ -198,14 +211,14 @@ mod tests {
         let grid = WallGrid::new(&circle, 0.0072, 1.0);
         let (width, _) = grid.tile_size_m();
         assert!((width * grid.columns as f64 - circle.perimeter_m()).abs() < 1e-9);
-        assert!((grid.spacing_m / 0.0072 - 1.0).abs() < 0.01);
+        assert!((grid.spacing_s_m / 0.0072 - 1.0).abs() < 0.01);
     }
 
     /// A tenth of a per mille in the size of pixels is millimetres of wall a kilometre on.
     #[test]
-    fn the_lattice_does_not_depend_on_small_changes_of_the_pixels_size() {
+    fn the_squared_lattice_does_not_depend_on_small_changes_of_the_pixels_size() {
         let circle = Circle::new(3.0).unwrap();
-        let of_size = |pixel_size_m: f64| WallGrid::new(&circle, pixel_size_m, 2.0);
+        let of_size = |pixel_size_m: f64| WallGrid::new(&circle, pixel_size_m, 2.0).squared();
         let far = TileId {
             column: 7,
             row: 30_000,
@@ -271,9 +284,9 @@ mod tests {
         for (column, row) in [(0, 4), (7, -3), (grid.columns - 1, 11)] {
             let (a, right) = (centre(column, row), centre(column + 1, row));
             let along = shortest_arc(right.s_m - a.s_m, circle.perimeter_m());
-            assert!((along - width).abs() < grid.spacing_m);
+            assert!((along - width).abs() < grid.spacing_s_m);
             let below = centre(column, row + 1);
-            assert!((below.h_m - a.h_m - height).abs() < grid.spacing_m);
+            assert!((below.h_m - a.h_m - height).abs() < grid.spacing_h_m);
         }
     }
 
@@ -284,7 +297,7 @@ mod tests {
         let grid = WallGrid::new(&circle, 0.02, 2.0);
         let fraction = |column: i64, row: i64| {
             let h_m = grid.centre(TileId { column, row }).h_m;
-            (h_m / grid.spacing_m).rem_euclid(1.0)
+            (h_m / grid.spacing_h_m).rem_euclid(1.0)
         };
         for along in [true, false] {
             let mut quarters = [0; 4];

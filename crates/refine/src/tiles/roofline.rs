@@ -139,7 +139,7 @@ fn roofline() {
                         pixels: 0.25,
                         shade: 1.0,
                     });
-                    let spacing_m = (grid.spacing_m, grid.spacing_m);
+                    let spacing_m = (grid.spacing_s_m, grid.spacing_h_m);
                     workspace.compute_moments(&points, observations, spacing_m, &weighting);
                 },
             );

@@ -355,7 +355,7 @@ mod tests {
         };
         for density in [1.0, 2.0] {
             let grid = WallGrid::new(&circle, 3.0 / camera().fy, density);
-            let spacing = (grid.spacing_m, grid.spacing_m);
+            let spacing = (grid.spacing_s_m, grid.spacing_h_m);
             let tiles = tiles(&grid, &circle);
             let observations = || {
                 frames.iter().map(|frame| TileObservation {
