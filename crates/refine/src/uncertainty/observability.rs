@@ -72,9 +72,9 @@ impl Posterior {
         let curvature = observe_curvature(problem, at_end, &factor, &scatter.signed)?;
         let posterior = borders.map(|(border, border_scatter)| {
             let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
-            let (prior, prior_border) = problem.other_information(&solution.unknowns);
+            let others = problem.other_information(&solution.unknowns);
             let scatter = (reduce_to_shared(pattern, &scatter.blocks, border_scatter, &w)
-                + reduce_to_shared(pattern, &prior, &prior_border, &w))
+                + reduce_to_shared(&others.pattern, &others.blocks, &others.border, &w))
                 / curvature.effective().powi(2);
             Self { w, schur, scatter }
         });

@@ -75,7 +75,7 @@ impl SolutionUncertainty {
                 (&solution.linearisation.normal, factor),
                 problem.constrained_gauge_freedoms(),
                 scatter.blocks,
-                || problem.other_information(&solution.unknowns).0,
+                || problem.other_information(&solution.unknowns),
                 curvature,
             );
             covariances.ok()
