@@ -23,7 +23,7 @@ const THREADS_VARIABLE: &str = "TUNNELSTITCH_THREADS";
 const JOIN_OPTION: &str = "--join";
 /// Variables of the C library of Linux that return memory to the system once it is free, instead of
 /// keeping it in pieces: without them a task that joins shards, which has the equations of all
-/// frames, has a fifth more at its peak. Others would take a twelfth more time for it. Bytes.
+/// frames, has a fifth more at its peak. Others have room, and it takes time. Bytes.
 const ALLOCATOR_VARIABLES: [&str; 2] = ["MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"];
 /// Their value: allocations that large are few and take long to fill.
 const ALLOCATOR_THRESHOLD: &str = "1048576";
