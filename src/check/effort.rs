@@ -1,6 +1,8 @@
 //! Time and memory that refining and stitching need.
 
-use crate::refine::{RefineOptions, SHARD_CACHE_BYTES, Shard, focal_search_registrations};
+use crate::refine::{
+    JOIN_CACHE_BYTES, RefineOptions, SHARD_CACHE_BYTES, Shard, focal_search_registrations,
+};
 use crate::survey::{CalibrationGroup, Survey};
 use serde::Serialize;
 
@@ -18,7 +20,7 @@ const TIME_PER_SEARCH_S: f64 = 4e-4;
 const TIME_PER_REGISTRATION_S: f64 = 0.02;
 /// Time with the wall solved jointly, relative to the time without: between ten and twenty.
 const JOINT_FACTOR: f64 = 15.0;
-/// Processor time of the last solve and the assessment, which come after shards are joined, over
+/// Processor time of the last solves and the assessment, which come after shards are joined, over
 /// that of a whole refinement.
 pub const JOIN_SHARE: f64 = 0.3;
 /// Memory of a frame's pyramid per pixel, bytes.
@@ -114,7 +116,7 @@ pub fn shard_bytes(survey: &Survey, shards: usize, threads: usize) -> u64 {
 
 /// Memory of joining shards, bytes, beside what the program takes for any survey.
 pub fn join_bytes(survey: &Survey) -> u64 {
-    let memory = (SHARD_CACHE_BYTES, EQUATION_BYTES_PER_FRAME);
+    let memory = (JOIN_CACHE_BYTES, EQUATION_BYTES_PER_FRAME);
     bytes_of_frames(survey, survey.frames.len(), memory)
 }
 

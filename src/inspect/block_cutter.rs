@@ -7,7 +7,7 @@ use crate::raster::{
     LevelTile, OverviewBuilder, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
     TILE_EDGE_PX, compress_jpeg,
 };
-use crate::render::{Band, Canvas, PixelFormat, Samples};
+use crate::render::{Band, Canvas, PixelFormat};
 use crate::surface::Surface;
 use std::io;
 
@@ -107,10 +107,7 @@ impl BlockCutter {
     /// Divides a band into tiles.
     fn tiles(&self, band: &Band) -> Vec<RasterTile> {
         let (width, bytes) = (self.spec.width as usize, self.spec.pixel_bytes());
-        let samples: std::borrow::Cow<[u8]> = match &band.samples {
-            Samples::Eight(samples) => samples.into(),
-            Samples::Sixteen(samples) => samples.iter().map(|v| (v >> 8) as u8).collect(),
-        };
+        let samples = band.samples.to_eight();
         let tile = |column: usize| {
             let first = column * TILE_EDGE_PX * bytes;
             let count = TILE_EDGE_PX.min(width - column * TILE_EDGE_PX) * bytes;

@@ -3,6 +3,7 @@
 use crate::files::printed;
 use crate::inspect::mark::MarkVersions;
 use crate::persist::atomic::WriteError;
+use crate::persist::part_file::PartError;
 use crate::raster::RasterError;
 use crate::render::RenderError;
 use crate::survey::SurveyError;
@@ -71,6 +72,9 @@ pub enum InspectError {
     /// An output cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// A part that another run has drawn cannot be taken over.
+    #[error(transparent)]
+    Part(#[from] PartError),
     /// The panorama of the textures cannot be drawn.
     #[error(transparent)]
     Render(#[from] RenderError),

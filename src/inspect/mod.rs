@@ -7,6 +7,8 @@
 //!                              ├─> GlbTarget ─> FILE.glb
 //!                              └─> TilesTarget ─> tileset.json, LEVEL/*.glb
 //!
+//! in shards (TextureShards): bands ─> BandFiles ─ files ─> read_band ─ bands ─> TilesTarget
+//!
 //! tunnel.json, wall.json (Manifest, WallPoints) ─┐
 //! tiles of every layer (TilesTarget) ────────────┼─ folder ─> web server, or Server ─> page (web/)
 //! index.html, viewer.js (Viewer) ────────────────┘              └─ Marks: marks.geojson, marks.csv
@@ -31,6 +33,7 @@
 //! # Ok::<(), tunnelstitch::surface::SurfaceError>(())
 //! ```
 
+mod band_files;
 mod block_cutter;
 mod deformation_layer;
 mod error;
@@ -45,6 +48,7 @@ mod mark;
 mod marks;
 mod mesh;
 mod server;
+mod tiles_shards;
 mod tiles_target;
 mod tileset;
 mod viewer;
@@ -60,6 +64,7 @@ pub use mark::{Geometry, Mark, MarkVersions, Properties};
 pub use marks::{MARKS_CSV, MARKS_GEOJSON, Marks};
 pub use mesh::{GridLines, Mesh, WallRectangle};
 pub use server::{Server, ServerContent, SourceFrames};
+pub use tiles_shards::TextureShards;
 pub use tiles_target::{TilesFolder, TilesTarget, tiles_px_per_metre};
 pub use tileset::TILESET;
 pub use viewer::Viewer;

@@ -27,11 +27,11 @@ pub struct PlanOptions {
     pub steps: BTreeSet<SectionStep>,
     /// Processors of a task.
     pub cores: u16,
-    /// Shards in which each section is refined and stitched.
+    /// Shards in which each section is refined, stitched and exported.
     pub division: Division,
 }
 
-/// Shards in which a section is refined and stitched.
+/// Shards in which a section is refined, stitched and exported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Division {
     /// So many, or fewer if it has not as many frames.
@@ -150,7 +150,7 @@ fn section_tasks(
             let earlier = earlier.filter(|_| part == Part::Whole);
             let seams = tasks
                 .get(first)
-                .filter(|_| *step == SectionStep::Stitch && matches!(part, Part::Shard(_)));
+                .filter(|_| *step != SectionStep::Refine && matches!(part, Part::Shard(_)));
             let after = earlier.chain(seams).map(|task| task.id.clone());
             let refined = is_after_refine.then(|| refine.clone());
             tasks.push(Task {
@@ -346,6 +346,25 @@ mod tests {
             stitch.after,
             ["K1.refine", seams.id.as_str(), &draw.id, &other.id]
         );
+        let tiles = PlanOptions {
+            division: Division::Shards(2),
+            ..options(&[SectionStep::Export])
+        };
+        let tiles = super::plan(&network, &dir.path().join("job"), &tiles).unwrap();
+        let [_, _, part, whole] = &tiles.tasks[..] else {
+            panic!("{tiles:?}");
+        };
+        assert_eq!(
+            part.command.join(" "),
+            "tunnelstitch export ../K1 --shard 2/2 --3dtiles K1/tiles-shards"
+        );
+        assert_eq!(part.after, ["K1.export-seams"]);
+        assert_eq!(part.outputs, [Path::new("K1/tiles-shards/shard-2-of-2")]);
+        assert_eq!(
+            whole.command.join(" "),
+            "tunnelstitch export ../K1 --join K1/tiles-shards --3dtiles K1/tiles"
+        );
+        assert_eq!(whole.outputs, [Path::new("K1/tiles")]);
         // No more shards than frames, and one is none.
         assert_eq!(plan(Division::Shards(9)), job);
         assert_eq!(plan(Division::FramesPerShard(2)).tasks.len(), 2);

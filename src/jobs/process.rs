@@ -19,6 +19,15 @@ const OPTION_VARIABLES: &str = "TUNNELSTITCH_";
 /// Variable with the number of threads, on which no result depends.
 const THREADS_VARIABLE: &str = "TUNNELSTITCH_THREADS";
 
+/// Option of the calls that put shards together.
+const JOIN_OPTION: &str = "--join";
+/// Variables of the C library of Linux that return memory to the system once it is free, instead of
+/// keeping it in pieces: without them a task that joins shards, which has the equations of all
+/// frames, has a fifth more at its peak. Others have room, and it takes time. Bytes.
+const ALLOCATOR_VARIABLES: [&str; 2] = ["MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"];
+/// Their value: allocations that large are few and take long to fill.
+const ALLOCATOR_THRESHOLD: &str = "1048576";
+
 /// Identifiers of the processes that run.
 static RUNNING: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
 
@@ -71,6 +80,9 @@ pub fn run_process(
         .stdin(Stdio::null())
         .stdout(output.try_clone()?)
         .stderr(output);
+    if arguments.iter().any(|word| word == JOIN_OPTION) {
+        command.envs(ALLOCATOR_VARIABLES.map(|name| (name, ALLOCATOR_THRESHOLD)));
+    }
     let mut child = command.spawn()?;
     running().insert(child.id());
     let ending = wait(&mut child, begin, limit);

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub enum Part {
     /// All of it, or what joins its shards.
     Whole,
-    /// Exposures and seams of a panorama, which its shards are drawn with.
+    /// Exposures and seams of a panorama or of 3D Tiles, which their shards are drawn with.
     Seams,
     /// One of its shards.
     Shard(ShardNumber),
@@ -44,7 +44,7 @@ pub struct SectionCalls<'s> {
     pub survey: PathBuf,
     /// True if its poses are refined.
     pub is_refined: bool,
-    /// Shards in which it is refined and stitched.
+    /// Shards in which it is refined, stitched and exported.
     pub shards: usize,
 }
 
@@ -59,8 +59,8 @@ impl SectionCalls<'_> {
         });
         let (seams, has_shards) = match step {
             SectionStep::Refine => (None, self.shards > 1),
-            SectionStep::Stitch => (Some(Part::Seams), self.shards > 1),
-            SectionStep::Report | SectionStep::Export => (None, false),
+            SectionStep::Stitch | SectionStep::Export => (Some(Part::Seams), self.shards > 1),
+            SectionStep::Report => (None, false),
         };
         let parts = seams.into_iter().chain(shards).filter(|_| has_shards);
         let parts = parts.chain([Part::Whole]);
@@ -86,9 +86,10 @@ impl SectionCalls<'_> {
         };
         let parts = match step {
             SectionStep::Stitch => format!("{id}/panorama-shards"),
+            SectionStep::Export => format!("{id}/tiles-shards"),
             _ => format!("{id}/shards"),
         };
-        let is_sharded = matches!(step, SectionStep::Refine | SectionStep::Stitch);
+        let is_sharded = step != SectionStep::Report;
         let (written, output) = match part {
             Part::Whole => {
                 if is_sharded && self.shards > 1 {

@@ -17,6 +17,8 @@ const TIME_PER_PANORAMA_PIXEL_S: f64 = 0.1e-6;
 const SEAMS_SHARE: f64 = 0.6;
 /// Share that putting it together from shards takes.
 const PANORAMA_JOIN_SHARE: f64 = 0.1;
+/// Share of the processor time of a panorama that cutting 3D Tiles from shards takes.
+const TILES_JOIN_SHARE: f64 = 0.4;
 /// Panoramas that a report compares: of initial and of refined poses.
 const PANORAMAS_OF_REPORT: f64 = 2.0;
 /// Processor time of starting the program, seconds.
@@ -80,12 +82,17 @@ impl SectionWork {
                 (self.shares[0] * self.refine_s, self.shard_bytes)
             }
             (SectionStep::Refine, _) => (self.shares[1] * self.refine_s, self.refine_bytes),
-            (SectionStep::Stitch, Part::Seams) => (SEAMS_SHARE * panorama_s, PANORAMA_BYTES),
-            (SectionStep::Stitch, Part::Shard(shard)) => {
+            (SectionStep::Stitch | SectionStep::Export, Part::Seams) => {
+                (SEAMS_SHARE * panorama_s, PANORAMA_BYTES)
+            }
+            (SectionStep::Stitch | SectionStep::Export, Part::Shard(shard)) => {
                 (panorama_s / shard.of as f64, PANORAMA_BYTES)
             }
             (SectionStep::Stitch, Part::Whole) if self.shards > 1 => {
                 (PANORAMA_JOIN_SHARE * panorama_s, PANORAMA_BYTES)
+            }
+            (SectionStep::Export, Part::Whole) if self.shards > 1 => {
+                (TILES_JOIN_SHARE * panorama_s, PANORAMA_BYTES)
             }
             (SectionStep::Stitch | SectionStep::Export, _) => (panorama_s, PANORAMA_BYTES),
             (SectionStep::Report, _) => (PANORAMAS_OF_REPORT * panorama_s, PANORAMA_BYTES),

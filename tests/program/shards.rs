@@ -75,7 +75,7 @@ fn a_job_of_shards_has_the_same_bytes_in_any_order_and_the_poses_of_a_single_run
     let dir = tempfile::tempdir().unwrap();
     let survey = refined(dir.path());
     let [forth, back] = ["forth", "back"].map(|name| dir.path().join(name));
-    let steps = ["--shards", "2", "--steps", "refine,stitch"];
+    let steps = ["--shards", "2", "--steps", "refine,stitch,export"];
     for job in [&forth, &back] {
         succeed(&[&["plan-job", text(&survey), "--out", text(job)], &steps[..]].concat());
     }
@@ -90,6 +90,10 @@ fn a_job_of_shards_has_the_same_bytes_in_any_order_and_the_poses_of_a_single_run
         "s.stitch-2",
         "s.stitch-1",
         "s.stitch",
+        "s.export-seams",
+        "s.export-2",
+        "s.export-1",
+        "s.export",
     ] {
         succeed(&["run-task", text(&back), task]);
     }
@@ -107,6 +111,18 @@ fn a_job_of_shards_has_the_same_bytes_in_any_order_and_the_poses_of_a_single_run
     let files = ["--poses", text(&poses), "--out", text(&whole)];
     succeed(&[&["stitch", text(&survey)], &files[..]].concat());
     assert!(panorama(&forth) == std::fs::read(&whole).unwrap());
+    let tiles = |folder: &Path| {
+        let mut files = outputs(folder);
+        // It names the files of the job.
+        files.remove(Path::new("run.toml"));
+        files
+    };
+    let whole = dir.path().join("tiles");
+    let files = ["--poses", text(&poses), "--3dtiles", text(&whole)];
+    succeed(&[&["export", text(&survey)], &files[..]].concat());
+    for job in [&forth, &back] {
+        assert!(tiles(&job.join("s/tiles")) == tiles(&whole));
+    }
     assert_near(&dir.path().join("plain"), &forth.join("s/refined"));
 }
 
@@ -230,4 +246,59 @@ fn parts_of_another_panorama_are_refused() {
     let message = call(&join, &out, 3);
     assert!(message.contains("shard-2-of-2"), "{message}");
     assert!(!out.exists());
+}
+
+/// More shards than bands, textures of grey pictures.
+#[test]
+fn tiles_in_shards_are_those_of_a_whole_export() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("s");
+    support::simulate(&survey, &["--frames", "20", "--size", "96x72"]);
+    let [parts, whole, joined] = ["parts", "whole", "joined"].map(|name| dir.path().join(name));
+    let words = |out: &Path| -> Vec<String> {
+        let words = [
+            "export",
+            text(&survey),
+            "--px-per-metre",
+            "160",
+            "--3dtiles",
+            text(out),
+        ];
+        words.map(str::to_owned).to_vec()
+    };
+    let export = |out: &Path, more: &[&str]| {
+        let words = words(out);
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        succeed(&[&words[..], more].concat());
+    };
+    export(&whole, &[]);
+    export(&parts, &["--seams"]);
+    for number in (1..=9).rev() {
+        export(&parts, &["--shard", &format!("{number}/9")]);
+    }
+    export(&joined, &["--join", text(&parts)]);
+    assert!(outputs(&whole).len() > 9);
+    assert!(outputs(&whole) == outputs(&joined));
+    // Bands that are damaged, missing, or of other textures.
+    let again = words(&dir.path().join("again"));
+    let again: Vec<&str> = again.iter().map(String::as_str).collect();
+    let join = ["--join", text(&parts)];
+    let message = fail(&[&again[..], &join, &["--quality", "50"]].concat(), 3);
+    assert!(message.contains("its options differ"), "{message}");
+    let folder = parts.join("shard-9-of-9");
+    let band = std::fs::read_dir(&folder)
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
+    let mut bytes = std::fs::read(&band).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&band, bytes).unwrap();
+    let message = fail(&[&again[..], &join].concat(), 3);
+    assert!(message.contains("hash does not match"), "{message}");
+    std::fs::remove_file(&band).unwrap();
+    let message = fail(&[&again[..], &join].concat(), 3);
+    assert!(message.contains("band-"), "{message}");
 }

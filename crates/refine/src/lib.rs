@@ -103,7 +103,7 @@ pub use refined::Refined;
 pub use report::{
     FrameFlag, FrameReport, HiddenBand, LevelReport, PoseReport, RefineReport, StageTime,
 };
-pub use shards::division::{SHARD_CACHE_BYTES, Shard};
+pub use shards::division::{JOIN_CACHE_BYTES, SHARD_CACHE_BYTES, Shard};
 pub use shards::join_shards::join_shards;
 pub use shards::refine_shard::refine_shard;
 pub use shards::state::ShardState;

@@ -1,15 +1,17 @@
 //! `tunnelstitch export`: writes the textured wall for 3D programs and for web servers.
 
-use crate::cli::arguments::{LayerArguments, LayerName, PosesArguments, TextureArguments};
+use crate::cli::arguments::{LayerArguments, LayerName, PosesArguments, TextureArguments, resume};
+use crate::cli::commands::export_shards::{join_shards, write_seams, write_shard};
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, check_parent_folder, json, record,
 };
 use crate::files::printed;
 use crate::inspect::{
-    ExportFiles, MANIFEST, PosedLayer, TILESET, Viewer, plan_layers, plan_wall, stage_page,
-    stage_wall,
+    ExportFiles, MANIFEST, PosedLayer, TILESET, TextureShards, Viewer, plan_layers, plan_wall,
+    stage_page, stage_wall,
 };
-use crate::persist::atomic::OutputSet;
+use crate::persist::atomic::{self, OutputSet};
+use crate::persist::shard_number::ShardNumber;
 use crate::render::{Canvas, PanoramaJob};
 use crate::survey::Survey;
 use crate::trajectory::{Trajectory, poses_of};
@@ -29,7 +31,12 @@ use std::path::{Path, PathBuf};
     tunnelstitch export my-survey --poses refined/poses.tum --3dtiles wall-tiles\n      \
     kilometres, for Cesium and other programs that stream 3D Tiles\n  \
     tunnelstitch export my-survey --poses refined/poses.tum --web walk\n      \
-    a page for any web server: python3 -m http.server --directory walk"
+    a page for any web server: python3 -m http.server --directory walk\n\n\
+    3D Tiles of a long survey in two shards, on two machines, and joined:\n  \
+    tunnelstitch export my-survey --seams --3dtiles parts\n  \
+    tunnelstitch export my-survey --shard 1/2 --3dtiles parts\n  \
+    tunnelstitch export my-survey --shard 2/2 --3dtiles parts\n  \
+    tunnelstitch export my-survey --join parts --3dtiles wall-tiles"
 )]
 pub struct ExportArguments {
     /// Folder of the survey, or its survey.toml.
@@ -52,6 +59,36 @@ pub struct ExportArguments {
     /// browser; `view` keeps them in files.
     #[arg(long, value_name = "DIR", group = "output", help_heading = "Output")]
     web: Option<PathBuf>,
+    /// Find only exposures and seams of the 3D Tiles, and write seams.state into the folder
+    /// --3dtiles, for --shard.
+    #[arg(
+        long,
+        requires = "tiles",
+        conflicts_with_all = ["shard", "join", "glb", "web"],
+        help_heading = "Shards of 3D Tiles"
+    )]
+    seams: bool,
+    /// Draw only shard K of N stretches along the tunnel, counted from 1, with the exposures and
+    /// seams in the folder --3dtiles, and write shard-K-of-N into it, for --join. It decodes its
+    /// own frames only.
+    #[arg(
+        long,
+        value_name = "K/N",
+        requires = "tiles",
+        conflicts_with_all = ["join", "glb", "web"],
+        help_heading = "Shards of 3D Tiles"
+    )]
+    shard: Option<ShardNumber>,
+    /// Cut the 3D Tiles from the seams and all shards in FOLDER. They have the bytes of those that
+    /// are drawn as a whole.
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        requires = "tiles",
+        conflicts_with_all = ["glb", "web"],
+        help_heading = "Shards of 3D Tiles"
+    )]
+    join: Option<PathBuf>,
     #[command(flatten)]
     layers: LayerArguments,
     #[command(flatten)]
@@ -89,21 +126,36 @@ pub fn run(
     }
     let inputs = record::hash_survey(&survey, arguments.poses.file())?;
     let files = arguments.files();
+    let options = arguments.textures.options();
     let mut outputs = OutputSet::default();
+    let poses = poses_of(&trajectory);
+    let origin = resume::origin(&survey, &arguments.options_of_parts(), inputs.clone())?;
+    let texture = TextureShards {
+        survey: &survey,
+        poses: &poses,
+        options,
+        origin: &origin,
+        job: PanoramaJob::new(terminal, 1),
+    };
+    if let Some(parts) = arguments.folder_of_parts() {
+        return match arguments.shard {
+            Some(shard) => write_shard(&texture, parts, shard, terminal),
+            None => write_seams(&texture, parts, terminal),
+        };
+    }
     let has_wall = files.glb.is_some() || files.tiles.is_some();
     let job = PanoramaJob::new(terminal, usize::from(has_wall) + arguments.count_layers());
-    let canvas = if has_wall {
-        let (poses, options) = (poses_of(&trajectory), arguments.textures.options());
-        Some(stage_wall(
+    let canvas = match (&arguments.join, &arguments.tiles) {
+        (Some(parts), Some(tiles)) => Some(join_shards(&texture, parts, tiles, &mut outputs)?),
+        _ if has_wall => Some(stage_wall(
             &survey,
             &poses,
             &options,
             files,
             &mut outputs,
             &job,
-        )?)
-    } else {
-        None
+        )?),
+        _ => None,
     };
     let layers = match &arguments.web {
         Some(folder) => {
@@ -142,6 +194,18 @@ impl ExportArguments {
         }
     }
 
+    /// The folder of the parts of the 3D Tiles, if one of them is written instead of all.
+    fn folder_of_parts(&self) -> Option<&Path> {
+        let is_part = self.seams || self.shard.is_some();
+        self.tiles.as_deref().filter(|_| is_part)
+    }
+
+    /// Everything that parts of the 3D Tiles depend on, except the survey.
+    fn options_of_parts(&self) -> impl Serialize {
+        let options = self.textures.options();
+        (options.px_per_metre, options.render, options.quality)
+    }
+
     /// Number of layers of the page, if there is one.
     fn count_layers(&self) -> usize {
         let layers = self.web.as_ref().map(|_| &self.layers);
@@ -168,7 +232,9 @@ fn describe(arguments: &ExportArguments, opened: (Survey, Trajectory)) -> Result
         writes: outputs.into_iter().flatten().cloned().collect(),
         ..Job::of(&opened.0, arguments.poses.file())
     };
-    job.writes.extend(arguments.run_files());
+    if arguments.folder_of_parts().is_none() {
+        job.writes.extend(arguments.run_files());
+    }
     if files.glb.is_some() || files.tiles.is_some() {
         let plan = plan_wall(&opened.0, &poses_of(&opened.1), &options, files)?;
         job.panorama_px = Some([plan.canvas.columns, plan.canvas.rows]);
@@ -209,6 +275,9 @@ fn print_summary(report: &ExportReport, terminal: &Terminal) {
 
 /// Checks the names, and that the program has its viewer, before any work is done.
 fn check_outputs(arguments: &ExportArguments) -> Result<(), Failure> {
+    if let Some(parts) = arguments.folder_of_parts() {
+        return Ok(atomic::check_folder(parts)?);
+    }
     if let Some(glb) = &arguments.glb {
         if glb.extension().is_none_or(|extension| extension != "glb") {
             return Err(Failure::usage(format!(

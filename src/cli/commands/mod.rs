@@ -7,6 +7,7 @@ pub mod converge;
 pub mod convert;
 pub mod demo;
 pub mod export;
+mod export_shards;
 pub mod gyro;
 pub mod init;
 mod init_summary;

@@ -22,12 +22,12 @@ const STATE_FILE: &str = "state";
 
 /// A part of a panorama, for `--json`.
 #[derive(Serialize)]
-struct PartReport {
+pub struct PartReport {
     /// The shard, unless it is the seams.
     #[serde(flatten)]
-    shard: Option<ShardNumber>,
+    pub shard: Option<ShardNumber>,
     /// Its file or folder.
-    file: PathBuf,
+    pub file: PathBuf,
 }
 
 /// Finds exposures and seams, and writes them into the folder of the parts.
@@ -116,7 +116,10 @@ pub fn join_shards(
     run.finish(files, &plan, inputs)
 }
 
-/// Reads a part.
-fn read<P: DeserializeOwned>(path: &Path, origin: &Origin) -> Result<P, Failure> {
+/// Reads a part of the run `origin`.
+///
+/// # Errors
+/// A part that is missing, damaged, or of another run.
+pub fn read<P: DeserializeOwned>(path: &Path, origin: &Origin) -> Result<P, Failure> {
     read_part(path, origin).map_err(|error| Failure::input(error.to_string()))
 }

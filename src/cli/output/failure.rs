@@ -245,7 +245,8 @@ impl From<InspectError> for Failure {
             InspectError::TooLong { .. } | InspectError::NoViewer | InspectError::Listen { .. } => {
                 Self::usage(error.to_string())
             }
-            InspectError::Marks { .. }
+            InspectError::Part(_)
+            | InspectError::Marks { .. }
             | InspectError::MarkConflict { .. }
             | InspectError::Folder { .. } => Self::input(error.to_string()),
         }

@@ -22,8 +22,8 @@ const PYRAMID_BYTES_PER_PIXEL: f64 = 6.0;
 ///
 /// If not all pyramids fit, the most recently used ones are kept, and as many other frames as fit
 /// in the form of [`StoredFrame`], from which a pyramid is quickly built. The set of stored frames
-/// does not change: a survey is processed from end to end repeatedly, so that the least recently
-/// used frame is needed next.
+/// does not change until it is released: a survey is processed from end to end repeatedly, so that
+/// the least recently used frame is needed next.
 ///
 /// Results do not depend on the state of the cache: decoding is deterministic.
 #[derive(Debug)]
@@ -162,11 +162,16 @@ impl FrameCache {
         lock(&self.shelf).kept.clear();
     }
 
-    /// Drops the cached pyramids if there is no room for those of all frames: those of the end of a
-    /// survey are not needed at its beginning.
-    pub fn release_pyramids(&self) {
+    /// Drops what there is no room for of all frames, pyramids and stored frames: those of the end
+    /// of a survey are not needed at its beginning, and a few of many save little.
+    pub fn release(&self) {
         if self.room < self.frames() {
             lock(&self.shelf).kept.clear();
+        }
+        let mut stored = lock(&self.stored);
+        if stored.kept.len() < self.frames() {
+            let kept = std::mem::take(&mut stored.kept);
+            stored.room += kept.values().map(|frame| frame.bytes()).sum::<usize>();
         }
     }
 
@@ -273,6 +278,24 @@ mod tests {
             assert_eq!(get(frame).unwrap(), 10.0 + frame as f32);
         }
         assert!(get(3).is_err());
+    }
+
+    #[test]
+    fn some_of_all_frames_are_released_and_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = files(folder.path());
+        // Memory for three of five frames, or for all.
+        for (frames, left) in [(4, 0), (8, 5)] {
+            let cache = FrameCache::new(&files, [32, 24], 1, frames * 32 * 24);
+            let get_all = || (0..5).for_each(|k| assert!(cache.get(k).is_ok()));
+            let stored = || lock(&cache.stored).kept.len();
+            get_all();
+            let before = stored();
+            cache.release();
+            assert_eq!((stored(), lock(&cache.shelf).kept.len()), (left, 0));
+            get_all();
+            assert_eq!(stored(), before);
+        }
     }
 
     #[test]

@@ -23,6 +23,17 @@ pub struct Linearisation {
     pub constraint: Option<(usize, Block)>,
 }
 
+/// Information that is not that of pixels: of the prior, and of measured points. It has a small
+/// part of the blocks of the normal matrix.
+pub struct OtherInformation {
+    /// The pattern of its blocks.
+    pub pattern: Pattern,
+    /// The blocks.
+    pub blocks: Vec<Block>,
+    /// The border.
+    pub border: SharedBorder,
+}
+
 /// Gradient of the pixels' cost in one block of the wall.
 #[derive(Clone, Debug)]
 pub struct BlockGradient {

@@ -1,14 +1,15 @@
 //! Linearisation of the objective: cost, gradient and normal matrix.
 
 use crate::linear::bordered_system::SharedBorder;
-use crate::linear::normal_equations::{Block, NormalEquations};
+use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::RADIUS_INDEX;
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::parameters::shape::ShapeStep;
 use crate::parameters::unknowns::Unknowns;
+use crate::points::equations::PointEquations;
 use crate::problem::block_sums::BlockSums;
-use crate::problem::linearisation::{FrameContribution, Linearisation};
+use crate::problem::linearisation::{FrameContribution, Linearisation, OtherInformation};
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::problem::tile_share::TileShare;
 use tunnelstitch_geometry::camera::Cameras;
@@ -72,7 +73,12 @@ impl PhotometricProblem<'_> {
     /// Adds all terms but those of the pixels.
     pub(super) fn add_others(&self, unknowns: &Unknowns, sums: &mut Linearisation) {
         let (calibration, kappa) = (&self.context.calibration, &unknowns.kappa);
-        sums.cost += self.add_prior(unknowns, &mut sums.normal, sums.border.as_mut());
+        sums.cost += self.add_prior(
+            unknowns,
+            &self.pattern,
+            &mut sums.normal,
+            sums.border.as_mut(),
+        );
         sums.cost += self.add_points(&unknowns.shape, &mut sums.normal);
         if let Some(border) = &mut sums.border {
             sums.cost +=
@@ -168,32 +174,52 @@ impl PhotometricProblem<'_> {
 
     /// Normal matrix and border of all that is not pixels, at the given unknowns: the prior, and
     /// measured points.
-    pub fn other_information(&self, unknowns: &Unknowns) -> (Vec<Block>, SharedBorder) {
-        let (blocks, border) = self.prior_information(unknowns);
-        let Some(points) = &self.points else {
-            return (blocks, border);
-        };
+    pub fn other_information(&self, unknowns: &Unknowns) -> OtherInformation {
+        let first = self.active.len();
+        let points = self.points.as_deref();
+        let of_points = points.into_iter().flat_map(PointEquations::pairs);
+        let of_points = of_points.map(|(a, b)| (first + a, first + b));
+        let pairs = self.prior_pairs().into_iter().chain(of_points);
+        let pattern = Pattern::new(self.pattern.columns(), pairs);
+        let (blocks, border) = self.prior_information(unknowns, &pattern);
         let mut normal = NormalEquations {
             blocks,
-            ..NormalEquations::zeros(&self.pattern)
+            gradient: Vec::new(),
         };
-        points.add_information(&self.pattern, self.active.len(), &mut normal);
-        (normal.blocks, border)
+        if let Some(points) = points {
+            points.add_information(&pattern, first, &mut normal);
+        }
+        OtherInformation {
+            pattern,
+            blocks: normal.blocks,
+            border,
+        }
     }
 
-    /// Normal matrix and border of the prior alone, at the given unknowns.
-    pub fn prior_information(&self, unknowns: &Unknowns) -> (Vec<Block>, SharedBorder) {
-        let mut normal = NormalEquations::zeros(&self.pattern);
-        let mut border = SharedBorder::zeros(self.pattern.columns());
-        self.add_prior(unknowns, &mut normal, Some(&mut border));
+    /// Pairs of slots that have a common prior.
+    pub fn prior_pairs(&self) -> Vec<(usize, usize)> {
+        self.context.prior.pairs(&self.active)
+    }
+
+    /// Normal matrix, on a pattern that has it, and border of the prior alone, at the given
+    /// unknowns.
+    pub fn prior_information(
+        &self,
+        unknowns: &Unknowns,
+        pattern: &Pattern,
+    ) -> (Vec<Block>, SharedBorder) {
+        let mut normal = NormalEquations::zeros(pattern);
+        let mut border = SharedBorder::zeros(pattern.columns());
+        self.add_prior(unknowns, pattern, &mut normal, Some(&mut border));
         border.apply_prior(&self.context.calibration, &unknowns.kappa);
         (normal.blocks, border)
     }
 
-    /// Adds the prior of poses, exposures and shape and returns its cost.
+    /// Adds the prior of poses, exposures and shape to equations on a pattern and returns its cost.
     pub(super) fn add_prior(
         &self,
         unknowns: &Unknowns,
+        pattern: &Pattern,
         normal: &mut NormalEquations,
         border: Option<&mut SharedBorder>,
     ) -> f64 {
@@ -202,15 +228,20 @@ impl PhotometricProblem<'_> {
             &self.with_active(&unknowns.frames),
             &self.active,
             &self.context.calibration.datum(&unknowns.kappa),
-            &self.pattern,
+            pattern,
             normal,
             border,
         );
-        of_frames + self.add_shape_prior(&unknowns.shape, normal)
+        of_frames + self.add_shape_prior(&unknowns.shape, pattern, normal)
     }
 
     /// Adds the prior of the shape, `½ Σ (c/σ)²`, and returns its cost.
-    fn add_shape_prior(&self, blocks: &[ShapeStep], normal: &mut NormalEquations) -> f64 {
+    fn add_shape_prior(
+        &self,
+        blocks: &[ShapeStep],
+        pattern: &Pattern,
+        normal: &mut NormalEquations,
+    ) -> f64 {
         let Some(shape) = &self.shape else {
             return 0.0;
         };
@@ -219,7 +250,7 @@ impl PhotometricProblem<'_> {
         for (k, (block, sigma_m)) in blocks.iter().zip(sigmas_m).enumerate() {
             let (slot, information) = (self.active.len() + k, sigma_m.powi(-2));
             let diagonal = Block::identity() * information;
-            normal.add_block(&self.pattern, slot, slot, &diagonal);
+            normal.add_block(pattern, slot, slot, &diagonal);
             normal.gradient[slot] += block * information;
             cost += 0.5 * information * block.norm_squared();
         }

@@ -179,14 +179,13 @@ impl PhotometricProblem<'_> {
         count: usize,
         work: impl Fn(&mut T, &mut ObservedTile) + Sync,
     ) -> Result<Vec<T>, ProblemError> {
-        let stride = (self.coverage.tiles / count).max(1);
         let mut gathered = Vec::new();
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch);
             let participants = self.coverage.frames(stretch);
             let pyramids = self.images.load(participants)?;
             let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
-            let tiles: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
+            let tiles = self.some_tiles(&visibility, count);
             let chunks = tiles.par_chunks(TILES_PER_TASK).map(|tiles| {
                 let mut gathered = T::default();
                 let mut workspace = TileWorkspace::default();
@@ -213,6 +212,28 @@ impl PhotometricProblem<'_> {
         }
         Ok(gathered)
     }
+
+    /// About `count` of all tiles, those of a stretch.
+    ///
+    /// In the last solves they are chosen by their places, `count` to twice as many: problems on
+    /// the same lattice have the same ones, and so the same noise and the same typical misfits,
+    /// even if some other tiles are observed.
+    fn some_tiles<'v>(&self, visibility: &'v Visibility, count: usize) -> Vec<&'v Tile> {
+        let stride = (self.coverage.tiles / count).max(1);
+        let tiles = visibility.tiles.iter();
+        match self.sampling.variance_weighting {
+            true => {
+                let stride = previous_power_of_two(stride);
+                tiles.filter(|tile| tile.id.is_one_in(stride)).collect()
+            }
+            false => tiles.step_by(stride).collect(),
+        }
+    }
+}
+
+/// The largest power of two up to a number of 1 or more.
+fn previous_power_of_two(number: usize) -> usize {
+    1 << number.ilog2()
 }
 
 /// A tile with its observers.

@@ -116,7 +116,8 @@ mod tests {
         let at = problem.linearise(&ring.estimates).unwrap();
         let mut scores = problem.patch_scores(&at.block_gradients);
         let mut prior = crate::linear::normal_equations::NormalEquations::zeros(problem.pattern());
-        problem.add_prior(&problem.unknowns_of(&ring.estimates), &mut prior, None);
+        let unknowns = problem.unknowns_of(&ring.estimates);
+        problem.add_prior(&unknowns, problem.pattern(), &mut prior, None);
         for _ in 0..3 {
             let mut sums = vec![FrameStep::zeros(); ring.estimates.len()];
             for score in scores.iter() {

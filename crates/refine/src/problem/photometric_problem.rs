@@ -128,6 +128,11 @@ impl<'a> PhotometricProblem<'a> {
         let pixel_size_m = pixel_size_on_wall(context.surface.as_ref(), &cameras, poses);
         let density = density.max(min_density(cameras.size()[1]));
         let grid = WallGrid::new(context.surface.as_ref(), pixel_size_m, density);
+        // Where the last solve begins is not to matter.
+        let grid = match sampling.variance_weighting {
+            true => grid.squared(),
+            false => grid,
+        };
         let images = FrameImages {
             frames: context.frames,
             first: participants.start,

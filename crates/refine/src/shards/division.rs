@@ -9,9 +9,12 @@ use std::ops::Range;
 /// in common as a long window of tracking, in which a bend straightens.
 const BESIDE_FRAMES: usize = LONG_WINDOW_FRAMES / 2;
 
-/// Memory for decoded frames where a survey is refined in several stretches, bytes: the task that
-/// joins them has little memory for them, and others have no more.
+/// Memory for decoded frames of a stretch, where a survey is refined in several, bytes.
 pub const SHARD_CACHE_BYTES: usize = 256 << 20;
+
+/// Memory for decoded frames where stretches are joined, bytes: the equations of all frames need
+/// the rest, and a long survey's frames would not fit into several times as much.
+pub const JOIN_CACHE_BYTES: usize = 128 << 20;
 
 /// A stretch of a survey's frames.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,11 +58,12 @@ impl Shard {
     }
 }
 
-/// The options for a survey in so many stretches.
-pub fn options_of(options: &RefineOptions, stretches: usize) -> RefineOptions {
+/// The options for a survey in so many stretches, with at most so much memory for decoded frames if
+/// there are several.
+pub fn options_of(options: &RefineOptions, stretches: usize, cache_bytes: usize) -> RefineOptions {
     let mut own = options.clone();
     if stretches > 1 {
-        own.cache_bytes = own.cache_bytes.min(SHARD_CACHE_BYTES);
+        own.cache_bytes = own.cache_bytes.min(cache_bytes);
     }
     own
 }

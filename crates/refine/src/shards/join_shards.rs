@@ -11,7 +11,7 @@ use crate::refined::Refined;
 use crate::report::StageTime;
 use crate::samples::footprints::{extent_h_m, footprints};
 use crate::shards::alignment::ShardAlignment;
-use crate::shards::division::{Shard, options_of};
+use crate::shards::division::{JOIN_CACHE_BYTES, Shard, options_of};
 use crate::shards::joined_frames::{JoinedFrames, join_frames};
 use crate::shards::joined_light::{JoinedLight, join_light};
 use crate::shards::joined_shape::{WallStretch, join_shapes};
@@ -44,7 +44,8 @@ pub fn join_shards<'a>(
     checkpoint: Option<&mut Checkpoint>,
     progress: &Arc<dyn Progress>,
 ) -> Result<Refined, RefineError> {
-    let (input, options) = (input.into(), &options_of(options, shards.len()));
+    let input = input.into();
+    let options = &options_of(options, shards.len(), JOIN_CACHE_BYTES);
     let mut session = Session::new(checkpoint, progress);
     let snapshot = match session.snapshot()? {
         Some(snapshot) => Some(snapshot),
@@ -186,7 +187,7 @@ fn joined_snapshot(
 /// The stages that are over and those that are left: from the last solve on, and before it the
 /// comparison of pairs, which registers rejected frames again, if some have been `displaced`.
 fn stages_left(stages: &VecDeque<Stage>, displaced: bool) -> (Vec<Stage>, VecDeque<Stage>) {
-    let last = stages.iter().position(Stage::is_last_solve);
+    let last = stages.iter().position(Stage::is_dense_solve);
     let mut over: Vec<Stage> = stages.iter().copied().collect();
     let left = over.split_off(last.unwrap_or(over.len()));
     let validate = displaced.then_some(Stage::ValidatePairs);

@@ -5,7 +5,7 @@ use crate::input::RefineInput;
 use crate::options::RefineOptions;
 use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS};
 use crate::pipeline::{Pause, run};
-use crate::shards::division::{Shard, options_of};
+use crate::shards::division::{SHARD_CACHE_BYTES, Shard, options_of};
 use crate::shards::state::{ShardEnd, ShardState, StraightShard};
 use crate::stages::plan::Stage;
 use crate::stages::session::Session;
@@ -30,7 +30,8 @@ pub fn refine_shard<'a>(
     checkpoint: Option<&mut Checkpoint>,
     progress: &Arc<dyn Progress>,
 ) -> Result<ShardState, RefineError> {
-    let (input, options) = (input.into(), &options_of(options, of));
+    let input = input.into();
+    let options = &options_of(options, of, SHARD_CACHE_BYTES);
     let shard = shard_of(&input, number, of)?;
     let stretch = Stretch::new(&input, &shard);
     let input = stretch.input(&input);
@@ -40,7 +41,7 @@ pub fn refine_shard<'a>(
         &input,
         options,
         snapshot,
-        Stage::is_last_solve,
+        Stage::is_dense_solve,
         &mut session,
     )?;
     progress.leave_job();

@@ -68,12 +68,10 @@ impl Solution<'_> {
         Ok(self.problem.patch_scores(&gradients))
     }
 
-    /// Gives back the memory of the normal matrix and of the observations, once the uncertainty is
-    /// known.
+    /// Gives back the memory of the normal matrix, once the uncertainty is known.
     pub fn release_equations(&mut self) {
         self.linearisation.normal.blocks = Vec::new();
         self.linearisation.border = None;
-        self.problem.coverage.release();
     }
 
     /// Removes the shared parameters from the equations that are tested only.

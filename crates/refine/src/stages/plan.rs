@@ -36,15 +36,16 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// True for the solve with the dense samples that a refinement ends with, after the solves and
+    /// True for the solves with the dense samples that a refinement ends with, after the solves and
     /// checks that bring every frame close.
-    pub fn is_last_solve(&self) -> bool {
+    pub fn is_dense_solve(&self) -> bool {
         matches!(self, Self::Solve(plan) if plan.sampling.variance_weighting)
     }
 }
 
 /// The stages of a refinement: track coarsely, check, solve at full size, check again with the
-/// lens and the shape that this has found, resolve aliases, solve with denser samples, assess.
+/// lens and the shape that this has found, resolve aliases, solve twice with denser samples,
+/// assess.
 pub fn plan_stages(options: &RefineOptions) -> VecDeque<Stage> {
     let mut stages = VecDeque::from([
         Stage::Prescreen,
@@ -54,8 +55,11 @@ pub fn plan_stages(options: &RefineOptions) -> VecDeque<Stage> {
         Stage::Solve(SolvePlan::first(options)),
         Stage::ValidatePairs,
         Stage::ResolveAliases,
-        Stage::Solve(SolvePlan::last(options)),
     ]);
+    if let Some(approach) = SolvePlan::approach(options) {
+        stages.push_back(Stage::Solve(approach));
+    }
+    stages.push_back(Stage::Solve(SolvePlan::last(options)));
     if options.joint {
         stages.push_back(Stage::Solve(SolvePlan::joint(options)));
     }
@@ -105,6 +109,18 @@ impl SolvePlan {
                 step_sigma: options.step_tolerance_sigma,
             },
         }
+    }
+
+    /// The solve before the last one, which only brings the estimate close for it.
+    ///
+    /// A solve selects its samples, and estimates noise and outlier mask, where it begins. Two that
+    /// begin a tenth of a pixel apart compare other tiles at the borders of frames, and end a tenth
+    /// of σ apart. So the last one begins close to where it ends, wherever this one has begun. None
+    /// if the last one ends as early as this one.
+    pub fn approach(options: &RefineOptions) -> Option<Self> {
+        let (last, stopping) = (Self::last(options), Stopping::intermediate(options, 0));
+        let is_earlier = stopping.step_sigma > last.stopping.step_sigma;
+        is_earlier.then_some(Self { stopping, ..last })
     }
 
     /// The solve after the last one, jointly with the wall ([`crate::joint`]).
@@ -171,7 +187,10 @@ mod tests {
         });
         let solves: Vec<(f64, bool)> = solves.collect();
         let joint = joint::SAMPLES_PER_PIXEL;
-        assert_eq!(solves, [(1.0, false), (2.0, false), (joint, true)]);
+        assert_eq!(
+            solves,
+            [(1.0, false), (2.0, false), (2.0, false), (joint, true)]
+        );
         assert_eq!(stages[3], Stage::ValidatePairs);
         assert_eq!(stages.back(), Some(&Stage::Assess));
     }

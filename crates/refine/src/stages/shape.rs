@@ -23,7 +23,7 @@ use std::ops::Range;
 const LENS: Range<usize> = 0..INTRINSIC_PARAMETERS;
 /// The curvature in κ.
 const BEND: Range<usize> = BEND_INDEX..BEND_INDEX + BEND_PARAMETERS;
-/// Rate at which a scale of no use is kept until the last solve, which sees more than the ones
+/// Rate at which a scale of no use is kept until the dense solves, which see more than the ones
 /// before.
 const KEPT_RATE: f64 = 0.3;
 /// Factor by which a strength may change without a new solve; the estimate hardly depends on it.
@@ -117,15 +117,15 @@ fn fix_shared(setup: &Setup, state: &mut PipelineState) {
 /// Learns the strengths of the shape at a full-size solution, and whether the lens differs from the
 /// given one, and the tunnel from a straight one. Returns true if that changes anything; the state
 /// is then where the new solve should end, or at the start if the shape is not adopted. `start`: of
-/// the solve; `is_last`: no other solve is certain to follow.
+/// the solve; `is_dense`: the solution has the samples of the last solves.
 pub fn learn(
     setup: &Setup,
     state: &mut PipelineState,
     (solution, start): (&Solution, &Start),
-    is_last: bool,
+    is_dense: bool,
 ) -> bool {
     let most_m = MAX_STRENGTH_SIGMAS * setup.shape_sigma_m;
-    let alpha = match is_last {
+    let alpha = match is_dense {
         true => setup.options.false_alarm_rate,
         false => KEPT_RATE,
     };

@@ -57,11 +57,11 @@ pub fn run<'a>(
     }
     let start = (state.kappa, state.frames.estimates.clone());
     let mut solution = solve(&plan, problem, setup, state, session)?;
-    let is_last = !has_solve_ahead(state);
+    let is_dense = plan.sampling.variance_weighting;
     let is_adopted = shape::take_over(setup, state, &solution, &start);
     let has_changed = may_learn_shape(state)
-        && (!is_adopted || shape::learn(setup, state, (&solution, &start), is_last));
-    if has_changed && is_last {
+        && (!is_adopted || shape::learn(setup, state, (&solution, &start), is_dense));
+    if has_changed && !has_solve_ahead(state) {
         plan_again(&plan, setup.options, state);
     }
     solution.remove_tested();

@@ -1,6 +1,7 @@
 //! Lattice of wall samples in square tiles.
 
 use nalgebra::Vector3;
+use std::f64::consts::SQRT_2;
 use tunnelstitch_geometry::surface::{Footprint, Surface, WallFrame, WallPoint};
 
 /// Samples along the side of a tile.
@@ -47,6 +48,16 @@ impl TileId {
     pub fn block(&self) -> (i64, i64) {
         (self.row.div_euclid(BLOCK), self.column.div_euclid(BLOCK))
     }
+
+    /// True for one in about `stride` tiles, spread over all of the wall: those with the first part
+    /// of the fractions `frac(row √2 + column √3)`, which fill the unit interval evenly.
+    ///
+    /// Source: L. Kuipers and H. Niederreiter, "Uniform Distribution of Sequences", 1974.
+    pub fn is_one_in(&self, stride: usize) -> bool {
+        const SQRT_3: f64 = 1.732_050_807_568_877_2;
+        let sum = self.row as f64 * SQRT_2 + self.column as f64 * SQRT_3;
+        (sum - sum.floor()) * (stride as f64) < 1.0
+    }
 }
 
 /// Quasi-random point of the unit square for a column and row:
@@ -73,6 +84,16 @@ impl WallGrid {
             spacing_h_m: spacing_m,
             columns,
             density,
+        }
+    }
+
+    /// The lattice with the spacing along s along h, too: poses that are a little different, and
+    /// with them the size of a pixel, have the same one, kilometres along the tunnel.
+    #[must_use]
+    pub fn squared(self) -> Self {
+        Self {
+            spacing_h_m: self.spacing_s_m,
+            ..self
         }
     }
 
@@ -191,6 +212,37 @@ mod tests {
         let (width, _) = grid.tile_size_m();
         assert!((width * grid.columns as f64 - circle.perimeter_m()).abs() < 1e-9);
         assert!((grid.spacing_s_m / 0.0072 - 1.0).abs() < 0.01);
+    }
+
+    /// A tenth of a per mille in the size of pixels is millimetres of wall a kilometre on.
+    #[test]
+    fn the_squared_lattice_does_not_depend_on_small_changes_of_the_pixels_size() {
+        let circle = Circle::new(3.0).unwrap();
+        let of_size = |pixel_size_m: f64| WallGrid::new(&circle, pixel_size_m, 2.0).squared();
+        let far = TileId {
+            column: 7,
+            row: 30_000,
+        };
+        let [a, b] = [0.0072, 0.0072 * 1.0001].map(|size_m| of_size(size_m).centre(far));
+        assert_eq!((a.s_m, a.h_m), (b.s_m, b.h_m));
+    }
+
+    #[test]
+    fn one_in_some_tiles_is_spread_over_all_of_the_wall() {
+        for stride in [1, 8, 64] {
+            let count = |rows: std::ops::Range<i64>| -> usize {
+                let tiles = rows.flat_map(|row| (0..80).map(move |column| TileId { column, row }));
+                tiles.filter(|tile| tile.is_one_in(stride)).count()
+            };
+            for first in [-3000, -7, 0, 90_000] {
+                let expected = 80 * 60 / stride;
+                let found = count(first..first + 60);
+                assert!(
+                    found.abs_diff(expected) <= expected / 10,
+                    "{stride}: {found}"
+                );
+            }
+        }
     }
 
     #[test]

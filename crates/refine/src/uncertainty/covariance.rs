@@ -48,6 +48,7 @@ use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
 use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
+use crate::problem::linearisation::OtherInformation;
 use crate::uncertainty::exposure_equations::{ExposurePattern, POSE};
 use crate::uncertainty::frame_sigma::FrameSigma;
 use nalgebra::{Matrix6, Vector6};
@@ -155,8 +156,8 @@ const MIN_DETERMINED: f64 = 1e-6;
 /// Computes the inverse of the normal matrix and the dispersion at a solution.
 ///
 /// `normal`: H, with its `factor` and with `tied` freedoms of the gauge tied; `scatter`: V of the
-/// pixels; `prior`: makes P, once V is no longer in memory; all on `pattern`, whose first `frames`
-/// slots are frames and the others the wall's shape. `curvature`: κ.
+/// pixels; both on `pattern`, whose first `frames` slots are frames, the others the wall's shape;
+/// `prior`: makes P, once V is no longer in memory. `curvature`: κ.
 ///
 /// # Errors
 /// [`FactorError`] if the equations of the exposures are singular.
@@ -166,14 +167,14 @@ pub fn compute_covariances(
     (normal, factor): (&NormalEquations, &Factor),
     tied: usize,
     scatter: Vec<Block>,
-    prior: impl FnOnce() -> Vec<Block>,
+    prior: impl FnOnce() -> OtherInformation,
     curvature: f64,
 ) -> Result<NoiseCovariance, FactorError> {
     let exposures = ExposurePattern::new(pattern, frames);
     let of_exposures = inverse_of_exposures(pattern, &exposures, normal)?;
     let inverse = SelectedInverse::new(factor);
     // tr(J⁻¹ E Q Eᵀ).
-    let trace = |blocks: &[Block]| {
+    let trace = |pattern: &Pattern, blocks: &[Block]| {
         trace_of_product(pattern, &inverse, blocks)
             - trace_of_product(
                 &exposures.slots,
@@ -181,9 +182,10 @@ pub fn compute_covariances(
                 &exposures.blocks(pattern, blocks),
             )
     };
-    let of_pixels = trace(&scatter) / curvature.powi(2);
+    let of_pixels = trace(pattern, &scatter) / curvature.powi(2);
     drop(scatter);
-    let of_prior = trace(&prior());
+    let prior = prior();
+    let of_prior = trace(&prior.pattern, &prior.blocks);
     let of_shape = (pattern.columns() - frames) * FRAME_PARAMETERS;
     let freedoms = (frames * POSE + of_shape - tied) as f64;
     // The freedoms that pixels determine, by their share of the information.
@@ -230,7 +232,16 @@ fn trace_of_product(pattern: &Pattern, inverse: &SelectedInverse, blocks: &[Bloc
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linear::bordered_system::SharedBorder;
     use nalgebra::DMatrix;
+
+    fn information(pattern: &Pattern, blocks: &[Block]) -> OtherInformation {
+        OtherInformation {
+            pattern: pattern.clone(),
+            blocks: blocks.to_vec(),
+            border: SharedBorder::zeros(pattern.columns()),
+        }
+    }
 
     fn factorise<'n>(pattern: &Pattern, normal: &'n NormalEquations) -> Factor<'n> {
         let symbolic = SymbolicFactorisation::new(pattern).unwrap();
@@ -270,7 +281,7 @@ mod tests {
         let normal = (&normal, &factor);
         let at = |scatter: &[Block], prior: &[Block], curvature: f64| {
             let scatter = scatter.to_vec();
-            let prior = || prior.to_vec();
+            let prior = || information(&pattern, prior);
             let found = compute_covariances(&pattern, 3, normal, 0, scatter, prior, curvature);
             let found = found.unwrap();
             let factor = found.variance_factor;
@@ -295,7 +306,10 @@ mod tests {
         assert!((same.0 - 1.0).abs() < 1e-12);
         // With the gauge tied, two of 18 freedoms are no freedoms.
         let scatter = normal.0.blocks.clone();
-        let tied = compute_covariances(&pattern, 3, normal, 2, scatter, || none, 1.0).unwrap();
+        let tied = {
+            let prior = || information(&pattern, &none);
+            compute_covariances(&pattern, 3, normal, 2, scatter, prior, 1.0).unwrap()
+        };
         assert!((tied.variance_factor - 18.0 / 16.0).abs() < 1e-12);
     }
 
@@ -325,7 +339,10 @@ mod tests {
         let none = vec![Block::zeros(); pattern.blocks()];
         let factor = factorise(&pattern, &normal);
         let normal = (&normal, &factor);
-        let found = compute_covariances(&pattern, 2, normal, 0, blocks(&q), || none, 1.0).unwrap();
+        let found = {
+            let prior = || information(&pattern, &none);
+            compute_covariances(&pattern, 2, normal, 0, blocks(&q), prior, 1.0).unwrap()
+        };
         let poses: Vec<usize> = (0..2 * FRAME_PARAMETERS)
             .filter(|k| k % FRAME_PARAMETERS < POSE)
             .collect();

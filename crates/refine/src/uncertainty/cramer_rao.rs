@@ -158,7 +158,8 @@ pub fn pose_bounds(
     // One pixel is FINER² fine pixels.
     let noise_grey = f64::from(FINER) * noise_grey;
     let problem = PhotometricProblem::new(&context, sampling, window)?.with_known_noise(noise_grey);
-    let (prior, _) = problem.prior_information(&problem.unknowns_of(&estimates));
+    let unknowns = problem.unknowns_of(&estimates);
+    let (prior, _) = problem.prior_information(&unknowns, problem.pattern());
     let with_prior = problem.linearise(&estimates)?.normal;
     let bayesian = invert(&problem, &with_prior, count)?;
     let pixels = subtract_pose_prior(problem.pattern(), &prior, with_prior, count);

@@ -125,7 +125,10 @@ impl EstimateErrors {
         let equations = exposures.equations(pattern, normal);
         let of_exposures = symbolic.factorise(&equations, 0.0);
         let of_exposures = of_exposures.map_err(|source| problem.factor_error(source))?;
-        let prior = PriorRoot::of(pattern, &problem.prior_information(&solution.unknowns).0);
+        let of_prior = Pattern::new(pattern.columns(), problem.prior_pairs());
+        let (blocks, _) = problem.prior_information(&solution.unknowns, &of_prior);
+        let prior = PriorRoot::of(&of_prior, &blocks);
+        drop(blocks);
         let Some(prior) = prior else {
             return Ok(None);
         };

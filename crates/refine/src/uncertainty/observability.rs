@@ -10,8 +10,10 @@ use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
+use crate::parameters::unknowns::Unknowns;
+use crate::problem::linearisation::Linearisation;
+use crate::problem::photometric_problem::PhotometricProblem;
 use crate::problem::score_scatter::ScoreScatter;
-use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::MAX_SIGMA_SHARE;
 use crate::uncertainty::observed_curvature::{ObservedCurvature, observe_curvature};
 use crate::uncertainty::shared_parameter_names::{PARAMETERS, ParameterKind};
@@ -49,16 +51,18 @@ impl Posterior {
     /// Observes the curvature κ ([`crate::uncertainty::observed_curvature`]) at a solution and
     /// eliminates the poses: κ, the posterior if a shared parameter was estimated, and the factor
     /// of the normal matrix. Where that is singular and none was, nothing is known of the poses,
-    /// and κ is 1.
+    /// and κ is 1. `at`: the equations at the unknowns `from`, within a step of the solution's
+    /// `unknowns`.
     ///
     /// # Errors
     /// [`ProblemError::Factor`] if shared parameters were estimated and the poses' normal matrix is
     /// singular; a frame that has to be read again and cannot be.
     pub fn with_curvature<'s>(
-        solution: &'s Solution,
+        problem: &PhotometricProblem,
+        (at, from): (&'s Linearisation, &Unknowns),
+        unknowns: &Unknowns,
         scatter: &ScoreScatter,
     ) -> Result<(ObservedCurvature, Option<Self>, Option<Factor<'s>>), ProblemError> {
-        let (problem, at) = (&solution.problem, &solution.linearisation);
         let borders = at.border.as_ref().zip(scatter.border.as_ref());
         let pattern = problem.pattern();
         let factor = match problem.symbolic().factorise(&at.normal, 0.0) {
@@ -68,13 +72,12 @@ impl Posterior {
             }
             Err(source) => return Err(problem.factor_error(source)),
         };
-        let at_end = (at, &solution.linearised_at);
-        let curvature = observe_curvature(problem, at_end, &factor, &scatter.signed)?;
+        let curvature = observe_curvature(problem, (at, from), &factor, &scatter.signed)?;
         let posterior = borders.map(|(border, border_scatter)| {
             let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
-            let (prior, prior_border) = problem.other_information(&solution.unknowns);
+            let others = problem.other_information(unknowns);
             let scatter = (reduce_to_shared(pattern, &scatter.blocks, border_scatter, &w)
-                + reduce_to_shared(pattern, &prior, &prior_border, &w))
+                + reduce_to_shared(&others.pattern, &others.blocks, &others.border, &w))
                 / curvature.effective().powi(2);
             Self { w, schur, scatter }
         });

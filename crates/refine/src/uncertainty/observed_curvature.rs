@@ -42,7 +42,7 @@ use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::parameters::unknowns::Unknowns;
-use crate::problem::linearisation::Linearisation;
+use crate::problem::linearisation::{Linearisation, OtherInformation};
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::uncertainty::exposure_equations::POSE;
 
@@ -104,9 +104,9 @@ pub fn observe_curvature(
     let step = factor.step(scores);
     let to = problem.stepped(from, &step, &Kappa::zeros());
     let mut predicted = pattern.product(&at.normal.blocks, &step);
-    let (others, _) = problem.other_information(from);
-    let of_others = pattern.product(&others, &step);
-    let of_frames = information_of_frames(pattern, (&at.normal.blocks, &others), frames);
+    let others = problem.other_information(from);
+    let of_others = others.pattern.product(&others.blocks, &step);
+    let of_frames = information_of_frames((pattern, &at.normal.blocks), &others, frames);
     drop(others);
     for (predicted, of_others) in predicted.iter_mut().zip(&of_others) {
         *predicted -= of_others;
@@ -134,15 +134,18 @@ pub fn observe_curvature(
 }
 
 /// Geometric mean of `det(H_kk − P_kk)^(1/6)` of the poses of all frames of which pixels tell all
-/// of it; the blocks of H, and of P.
+/// of it; the blocks of H on their pattern, and P.
 fn information_of_frames(
-    pattern: &Pattern,
-    (normal, others): (&[Block], &[Block]),
+    (pattern, normal): (&Pattern, &[Block]),
+    others: &OtherInformation,
     frames: usize,
 ) -> f64 {
     let logarithms = (0..frames).filter_map(|k| {
-        let own = pattern.block_index(k, k)?;
-        let of_pixels = normal[own] - others[own];
+        let (own, of_others) = (
+            pattern.block_index(k, k)?,
+            others.pattern.block_index(k, k)?,
+        );
+        let of_pixels = normal[own] - others.blocks[of_others];
         let determinant = of_pixels.fixed_view::<POSE, POSE>(0, 0).determinant();
         (determinant > 0.0).then(|| determinant.ln() / POSE as f64)
     });

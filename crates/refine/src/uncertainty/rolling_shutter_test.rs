@@ -88,7 +88,9 @@ pub fn estimate_readout(
         Err(error) => return Err(error),
     };
     let scatter = solution.problem.score_scatter(&solution.linearisation);
-    let posterior = match Posterior::with_curvature(&solution, &scatter) {
+    let at_end = (&solution.linearisation, &solution.linearised_at);
+    let (problem, unknowns) = (&solution.problem, &solution.unknowns);
+    let posterior = match Posterior::with_curvature(problem, at_end, unknowns, &scatter) {
         Ok((_, Some(posterior), _)) => posterior,
         Ok((_, None, _)) | Err(ProblemError::Factor { .. }) => return Ok(None),
         Err(error) => return Err(error),

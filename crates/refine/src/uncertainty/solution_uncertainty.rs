@@ -59,15 +59,20 @@ impl SolutionUncertainty {
     ) -> Result<Self, ProblemError> {
         let scatter = solution.problem.score_scatter(&solution.linearisation);
         let finest = solution.take_patch_scores()?;
+        let frames = solution.unknowns.frames.len();
+        let at_end = (&solution.linearisation, &solution.linearised_at);
+        let (problem, unknowns) = (&solution.problem, &solution.unknowns);
+        let (observed, posterior, factor) =
+            Posterior::with_curvature(problem, at_end, unknowns, &scatter)?;
+        // Pixels are no longer needed.
+        solution.problem.coverage.release();
+        context.frames.release();
         let solution = &*solution;
         let problem = &solution.problem;
-        let frames = solution.unknowns.frames.len();
-        let (observed, posterior, factor) = Posterior::with_curvature(solution, &scatter)?;
         let curvature = observed.effective();
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
         let overdispersions = compute_overdispersions(context, solution, &scatter);
-        context.frames.release_pyramids();
         let of_noise = factor.as_ref().and_then(|factor| {
             let covariances = compute_covariances(
                 problem.pattern(),
@@ -75,7 +80,7 @@ impl SolutionUncertainty {
                 (&solution.linearisation.normal, factor),
                 problem.constrained_gauge_freedoms(),
                 scatter.blocks,
-                || problem.other_information(&solution.unknowns).0,
+                || problem.other_information(&solution.unknowns),
                 curvature,
             );
             covariances.ok()

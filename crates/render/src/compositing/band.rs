@@ -42,6 +42,17 @@ pub trait Target: Send {
 }
 
 impl Band {
+    /// A band of these pixels, without sources.
+    pub fn new(row: u32, rows: u32, format: PixelFormat, samples: Samples) -> Self {
+        Self {
+            row,
+            rows,
+            format,
+            samples,
+            sources: Vec::new(),
+        }
+    }
+
     /// Makes a band without rows, with sources or without.
     pub(crate) fn empty(canvas: &Canvas, format: PixelFormat, sources: bool) -> Self {
         let most = canvas.columns as usize * BAND_ROWS.min(canvas.rows) as usize;

@@ -2,6 +2,7 @@
 
 use image::{DynamicImage, ImageBuffer};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use tunnelstitch_geometry::numerics::rounding::ROUNDING_OFFSET;
 
 /// A sample of a picture: 8 or 16 bits.
@@ -60,6 +61,14 @@ pub enum Samples {
 }
 
 impl Samples {
+    /// The samples with their eight highest bits.
+    pub fn to_eight(&self) -> Cow<'_, [u8]> {
+        match self {
+            Self::Eight(samples) => samples.into(),
+            Self::Sixteen(samples) => samples.iter().map(|v| (v >> 8) as u8).collect(),
+        }
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         match self {
