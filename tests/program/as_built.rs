@@ -290,7 +290,7 @@ fn a_bend_that_is_declared_straight_is_found() {
     assert_eq!(report["shape"]["scales"], serde_json::json!([]));
     assert_eq!(report["scale"]["radius"], "given");
     let unseen = report["shape"]["unseen"].as_array().unwrap();
-    assert_eq!(unseen.len(), 4, "{unseen:?}");
+    assert_eq!(unseen.len(), 5, "{unseen:?}");
     for scale in unseen {
         let below_mm = scale["below_mm"].as_f64().unwrap();
         assert!((0.01..5.0).contains(&below_mm), "{scale}");

@@ -163,7 +163,7 @@ pub struct ShapeModel {
     extent_h_m: [f64; 2],
     /// The scales.
     pub scales: Vec<Scale>,
-    /// Scales that the wall is not seen to have, with the largest strength that they may have.
+    /// Scales that the wall is not seen to have, with the size from which on they would be seen.
     pub dropped: Vec<Scale>,
 }
 

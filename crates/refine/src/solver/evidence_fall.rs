@@ -8,6 +8,13 @@
 //! which is `n q²/4` for small q: about the fourth power of the strength, and less where others
 //! determine them together or L is not at its top. So it is searched for on a line through the
 //! logarithms, and ends where that is about straight.
+//!
+//! Few coefficients may be small by chance whatever their strength, and yet be seen where they are
+//! not: those of the mean square `x σ₀²` raise L at the strength that suits them by
+//!
+//! `½ n (x − ln(1 + x))`,
+//!
+//! as much as a strength lowers it if n is large, and sooner if it is not ([`seen_size`]).
 
 /// Step of the strength's logarithm that is taken without another evaluation.
 const NARROW: f64 = 0.17;
@@ -17,6 +24,30 @@ const MAX_EVALUATIONS: usize = 8;
 const POWERS: std::ops::RangeInclusive<f64> = 0.5..=4.0;
 /// Share of the interval that a new point keeps from its ends.
 const MARGIN: f64 = 0.1;
+/// Mean squares of coefficients over those of their errors, from and to.
+const ROOTS: [f64; 2] = [1e-9, 1e9];
+/// Halvings of the logarithms between them.
+const BISECTIONS: usize = 40;
+
+/// Size of n coefficients that raise L by `change`, over the strength that lowers it by as much.
+pub fn seen_size(n: f64, change: f64) -> f64 {
+    let x = root(|x| 0.5 * n * (x - x.ln_1p()) - change);
+    let q = root(|q| 0.5 * n * (q.ln_1p() - q / (1.0 + q)) - change);
+    (x / q).sqrt()
+}
+
+/// The root of a rising function within [`ROOTS`].
+fn root(function: impl Fn(f64) -> f64) -> f64 {
+    let [mut low, mut high] = ROOTS.map(f64::ln);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        match function(middle.exp()) < 0.0 {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    high.exp()
+}
 
 /// Values of the fall that are known.
 #[derive(Debug, Default)]
@@ -135,6 +166,18 @@ mod tests {
                 assert!(count.get() <= 10, "{n}, {top}: {}", count.get());
             }
         }
+    }
+
+    /// The two coefficients of an ovality are seen from 2.6 of their errors on; many are as large
+    /// as their strength.
+    #[test]
+    fn few_coefficients_are_seen_sooner_than_their_strength() {
+        assert!((seen_size(1e6, 4.8) - 1.0).abs() < 0.01);
+        let (change, size) = (4.8, seen_size(2.0, 4.8));
+        let sigma_m = EvidenceFall::default()
+            .strength_m(change, [1e-6, 1.0], |sigma_m| Some(fall(2.0, 0.0)(sigma_m)))
+            .unwrap();
+        assert!((2.2..3.0).contains(&(size * sigma_m / 2e-4)), "{size}");
     }
 
     #[test]

@@ -22,9 +22,10 @@
 //! dropped, the least useful first: a wall as planned ends without a shape, and its poses as if
 //! none had been looked for.
 //!
-//! The same L bounds what may hide below that: the strength of a dropped scale at which L has
-//! fallen by `½ z²`, z the quantile of the false-alarm rate, is what would have been seen; that at
-//! which it has fallen by ½, 1-σ, makes errors ([`DroppedScale`], [`LearnedShape::unseen_errors`]).
+//! The same L bounds what may hide below that: where coefficients of a dropped scale raise it by
+//! `½ z²`, z the quantile of the false-alarm rate, they would have been seen
+//! ([`crate::solver::evidence_fall`]); the strength at which it has fallen by ½, 1-σ, makes errors
+//! ([`DroppedScale`], [`LearnedShape::unseen_errors`]).
 //!
 //! A solve that ends for want of descent, as where the wall is not smooth, leaves a gradient that
 //! leads nowhere: then its end is taken for the minimum.
@@ -41,7 +42,7 @@ use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::parameters::shape::{Functions, Scale, Shape, ShapeModel, ShapeStep};
 use crate::parameters::unseen_errors::{EXPECTED_SQUARE, UNSEEN_DRAWS, UnseenError, UnseenErrors};
-use crate::solver::evidence_fall::EvidenceFall;
+use crate::solver::evidence_fall::{EvidenceFall, seen_size};
 use crate::solver::gauss_newton::Solution;
 use nalgebra::SMatrix;
 use rand::{Rng, SeedableRng};
@@ -76,7 +77,8 @@ pub struct DroppedScale {
     index: usize,
     /// 1-σ of its strength, metres: where L has fallen by ½.
     typical_m: f64,
-    /// The scale with the strength that would have been seen, but for the rate of false alarms.
+    /// The scale with the size of coefficients that would have been seen, but for the rate of false
+    /// alarms.
     pub limit: Scale,
 }
 
@@ -361,14 +363,17 @@ impl LearnedShape<'_> {
                 let log_evidence = self.equations.minimum(&sigmas_m)?.log_evidence;
                 Some(self.minimum.log_evidence - log_evidence)
             };
-            let range_m = [NEGLIGIBLE * scales[*k].sigma_m, most_m];
+            let least_m = NEGLIGIBLE * scales[*k].sigma_m;
+            let seen = fall(normal_quantile(alpha, 1));
+            let size = seen_size(scales[*k].functions.deformations() as f64, seen);
             let mut falls = EvidenceFall::default();
-            let mut limit = |z: f64| falls.strength_m(fall(z), range_m, of_strength);
+            let mut strength_m =
+                |fall: f64, most_m: f64| falls.strength_m(fall, [least_m, most_m], of_strength);
             Some(DroppedScale {
                 index: *k,
-                typical_m: limit(1.0)?,
+                typical_m: strength_m(fall(1.0), most_m)?,
                 limit: Scale {
-                    sigma_m: limit(normal_quantile(alpha, 1))?,
+                    sigma_m: size * strength_m(seen, most_m / size)?,
                     ..scales[*k]
                 },
             })
