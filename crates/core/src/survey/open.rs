@@ -142,8 +142,10 @@ impl Survey {
             skipped,
             times_s,
             video,
+            bits,
             warnings: picture_warnings,
         } = place.take_frames(surface.as_ref())?;
+        file.frames.bits = bits.or(file.frames.bits);
         if let Some(video) = &video {
             check_displayed_rows(video, &file).map_err(value)?;
         }

@@ -11,6 +11,7 @@ use super::pose_validation::feasible_conventions;
 use super::poses_section::PosesSection;
 use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{
     AngleUnit, CameraAxes, Convention, EulerSequence, Pose, PoseFormat, StampedPose, Trajectory,
@@ -60,6 +61,8 @@ pub struct PoseReading {
     pub remedy: String,
     /// Number of its changes to the reading given.
     pub changes: usize,
+    /// True if the pictures' files ask for it themselves, in their EXIF data.
+    pub is_stated: bool,
     /// Natural logarithm of its prior odds to a slip that people make often.
     pub prior_nats: f64,
     /// The initial poses.
@@ -78,6 +81,7 @@ impl PoseReading {
         Self {
             remedy,
             changes,
+            is_stated: false,
             prior_nats: 0.0,
             initial,
             orientation: PictureOrientation::Stored,
@@ -122,7 +126,9 @@ impl Survey {
             let initial = given.trajectory_in(&convention);
             PoseReading::of_poses(flags.join(" and "), flags.len(), initial)
         });
+        let exif = self.exif_orientation();
         let poses = conventions
+            .chain(exif.and_then(|number| self.of_stored_pictures(&given, number)))
             .chain(other_texts(section, &given))
             .chain(self.other_angles())
             .chain(self.shifted_readings(&given))
@@ -134,14 +140,20 @@ impl Survey {
         // Pictures of videos are displayed as they should be.
         let has_files = self.frames.iter().all(|frame| frame.reading().is_some());
         let orientations = ORIENTATIONS.into_iter().filter(|_| has_files);
-        let pictures = orientations.map(|(name, orientation)| PoseReading {
-            remedy: format!(
-                "{name} (orientation = \"{}\" under [frames])",
-                orientation.name()
-            ),
-            changes: 1,
-            orientation,
-            ..as_given.clone()
+        let pictures = orientations.map(|(name, orientation)| {
+            let is_stated =
+                !self.has_turned_pictures() && exif.and_then(of_exif) == Some(orientation);
+            let (name, asked) = match is_stated {
+                true => ("the pictures turned as EXIF says", PictureOrientation::Exif),
+                false => (name, orientation),
+            };
+            PoseReading {
+                remedy: format!("{name} (orientation = \"{}\" under [frames])", asked.name()),
+                changes: 1,
+                is_stated,
+                orientation,
+                ..as_given.clone()
+            }
         });
         let cameras = self.camera_readings().into_iter();
         let cameras = cameras.map(|(remedy, camera)| PoseReading {
@@ -155,6 +167,41 @@ impl Survey {
             .chain(pictures)
             .chain(cameras);
         Ok(std::iter::once(as_given.clone()).chain(others).collect())
+    }
+
+    /// The EXIF orientation, if all frames have the same, and another than as stored.
+    fn exif_orientation(&self) -> Option<u8> {
+        let files = self
+            .frames
+            .iter()
+            .all(|frame| frame.shared_file().is_none());
+        let looked_at = if files { self.frames.len() } else { 1 };
+        let frames = self.frames.get(..looked_at)?;
+        let numbers = frames.par_map(|frame| frame.exif_orientation().ok().flatten());
+        let first = numbers.first().copied().flatten();
+        first.filter(|_| numbers.iter().all(|number| *number == first))
+    }
+
+    /// The reading of poses as those of the camera with its pictures as it stored them, where these
+    /// are turned by a quarter as the EXIF orientation `number` asks.
+    fn of_stored_pictures(&self, given: &InterpretedPoses, number: u8) -> Option<PoseReading> {
+        let axes = CameraAxes::before_turning(number)?;
+        let is_other = self.has_turned_pictures() && given.convention.axes == CameraAxes::OpenCv;
+        let convention = Convention {
+            axes,
+            ..given.convention
+        };
+        is_other.then(|| {
+            let name = axes.name();
+            let remedy = format!(
+                "poses of the camera that stored the pictures before they were turned \
+                 (camera_axes = \"{name}\" under [poses])"
+            );
+            PoseReading {
+                is_stated: true,
+                ..PoseReading::of_poses(remedy, 1, given.trajectory_in(&convention))
+            }
+        })
     }
 
     /// True if pictures are turned as their EXIF data ask.
@@ -248,6 +295,16 @@ impl Survey {
             })
         };
         wanted.filter_map(reading).collect()
+    }
+}
+
+/// The orientation that the EXIF orientation `number` asks for, if it leaves the size as it is.
+fn of_exif(number: u8) -> Option<PictureOrientation> {
+    match number {
+        2 => Some(PictureOrientation::Mirrored),
+        3 => Some(PictureOrientation::Turned180),
+        4 => Some(PictureOrientation::Flipped),
+        _ => None,
     }
 }
 
