@@ -11,6 +11,7 @@ use super::pose_validation::feasible_conventions;
 use super::poses_section::PosesSection;
 use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
+use std::ops::RangeInclusive;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{
@@ -39,6 +40,10 @@ const RADIUS_SLIPS: [(f64, &str); 4] = [
 const OTHER_RADIUS_FACTORS: [f64; 4] = [0.4, 0.63, 1.58, 2.5];
 /// Prior of a radius that is off by a factor without a name, nats: one in twenty.
 const OTHER_RADIUS_NATS: f64 = -3.0;
+
+/// Units of poses without a scale, tenths of a decade from the one that is taken: `refine` finds
+/// what lies between them.
+const UNIT_TENTHS: RangeInclusive<i32> = -8..=8;
 
 /// Places that poses may be off by, later or earlier.
 const SHIFTS: [isize; 6] = [1, -1, 2, -2, 3, -3];
@@ -164,6 +169,7 @@ impl Survey {
         });
         let others = poses
             .chain(self.other_radii(given.format))
+            .chain(self.other_scales(given.format))
             .chain(pictures)
             .chain(cameras);
         Ok(std::iter::once(as_given.clone()).chain(others).collect())
@@ -214,10 +220,8 @@ impl Survey {
     /// given one, seen from positions that are scaled about its axis. Poses without a scale say
     /// nothing of it.
     fn other_radii(&self, format: PoseFormat) -> impl Iterator<Item = PoseReading> {
-        let tunnel = &self.file.tunnel;
-        let is_straight = tunnel.centreline.is_none() && self.bend.is_none();
         let has_scale = self.file.poses.unit_m.is_some() || !format.has_no_scale();
-        let radius_m = tunnel.radius_m.filter(|_| is_straight && has_scale);
+        let radius_m = self.file.tunnel.radius_m.filter(|_| has_scale);
         let slips = RADIUS_SLIPS.map(|(factor, what)| (factor, what.to_owned(), 0.0));
         let others = OTHER_RADIUS_FACTORS.map(|factor| {
             let what = format!("of about {factor} times the given radius");
@@ -226,18 +230,42 @@ impl Survey {
         let all = slips.into_iter().chain(others);
         all.filter_map(move |(factor, what, prior_nats)| {
             let radius_m = rounded(factor * radius_m?);
-            let scaled = |stamped: &StampedPose| StampedPose {
-                pose: Pose::new(stamped.pose.r_wc, stamped.pose.t_wc / factor),
-                ..*stamped
-            };
             let remedy = format!("a tunnel {what} (radius_m = {radius_m} under [tunnel])");
-            let initial = self.initial.iter().map(scaled).collect();
-            let reading = PoseReading {
+            let reading = self.scaled(1.0 / factor, remedy)?;
+            Some(PoseReading {
                 prior_nats,
-                ..PoseReading::of_poses(remedy, 1, initial)
-            };
-            is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)
+                ..reading
+            })
         })
+    }
+
+    /// Readings in other units of poses that have no scale of their own, whose unit nobody gave.
+    fn other_scales(&self, format: PoseFormat) -> impl Iterator<Item = PoseReading> {
+        let is_unknown = self.file.poses.unit_m.is_none() && format.has_no_scale();
+        let radius_m = self.file.tunnel.radius_m.filter(|_| is_unknown);
+        let tenths = UNIT_TENTHS.filter(|tenths| *tenths != 0);
+        tenths.filter_map(move |tenths| {
+            let radius_m = radius_m?;
+            let unit_m = (10f64.powf(0.1 * f64::from(tenths)) * 100.0).round() / 100.0;
+            let remedy = format!(
+                "a unit of the poses of about {unit_m} m (tunnelstitch init --force --radius-m \
+                 {radius_m} --unit-m {unit_m} writes it, with the axis)"
+            );
+            self.scaled(unit_m, remedy)
+        })
+    }
+
+    /// The reading with positions scaled about the axis of a straight tunnel, if they are inside.
+    fn scaled(&self, factor: f64, remedy: String) -> Option<PoseReading> {
+        let is_straight = self.file.tunnel.centreline.is_none() && self.bend.is_none();
+        let scaled = |stamped: &StampedPose| StampedPose {
+            pose: Pose::new(stamped.pose.r_wc, stamped.pose.t_wc * factor),
+            ..*stamped
+        };
+        let initial = self.initial.iter().map(scaled).collect();
+        let reading = PoseReading::of_poses(remedy, 1, initial);
+        let is_inside = is_inside(self.surface.as_ref(), &reading.initial);
+        (is_straight && is_inside).then_some(reading)
     }
 
     /// Readings of angles in the other unit, where that is given, and in the reverse order.
@@ -370,7 +398,7 @@ mod tests {
         assert!(read.r_wc.angle_to(&right) < 1e-12);
     }
 
-    /// A model of structure from motion has any size, whatever the radius.
+    /// A model of structure from motion has any size, whatever the radius: its unit is in question.
     #[test]
     fn poses_without_a_scale_say_nothing_of_the_radius() {
         let fixture = std::path::Path::new("../../fixtures/blender_free48");
@@ -379,6 +407,9 @@ mod tests {
         let all = RADIUS_SLIPS.len() + OTHER_RADIUS_FACTORS.len();
         assert_eq!(radii(PoseFormat::Tum), all);
         assert_eq!(radii(PoseFormat::Colmap), 0);
+        let units = |format| survey.other_scales(format).count();
+        assert_eq!(units(PoseFormat::Tum), 0);
+        assert!(units(PoseFormat::Colmap) > 8);
         let change = |file: &mut crate::survey::SurveyFile| file.poses.unit_m = Some(1.0);
         let with_unit = Survey::open_with(fixture, change).unwrap();
         let count = with_unit.other_radii(PoseFormat::Colmap).count();
