@@ -23,7 +23,6 @@ mod poses;
 mod result;
 mod run;
 mod statistics;
-mod unused_bits;
 mod warnings;
 
 pub use deformation::DeformationCheck;
@@ -39,4 +38,3 @@ pub use pictures::PictureCheck;
 pub use poses::PosesCheck;
 pub use result::Check;
 pub use run::check;
-pub use unused_bits::unused_bits_warning;

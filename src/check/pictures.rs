@@ -1,7 +1,7 @@
 //! Exposure, noise and texture of a dozen frames.
 
 use super::statistics::median_or_zero;
-use crate::frames::{FrameError, FrameFile, GreyImage, StoredFrame, brightest_bits, noise_sigma};
+use crate::frames::{FrameError, FrameFile, GreyImage, StoredFrame, noise_sigma};
 use crate::survey::Survey;
 use serde::Serialize;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -23,9 +23,6 @@ const MAX_LISTED_FAULTS: usize = 5;
 pub struct PictureCheck {
     /// Number of decoded frames.
     pub decoded: usize,
-    /// Bits of the brightest value, if the files are of 16 bits.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub used_bits: Option<u32>,
     /// Mean grey level, 0–255.
     pub grey: f64,
     /// Share of saturated pixels (black or white) among those that the mask does not hide, 0–1.
@@ -81,7 +78,6 @@ impl PictureCheck {
         let of = |value: fn(&Self) -> f64| median_or_zero(pictures.iter().map(value));
         let check = Self {
             decoded: pictures.len(),
-            used_bits: brightest_bits(&survey.frames, (width, height)),
             grey: of(|p| p.grey),
             clipped: of(|p| p.clipped),
             noise_grey: of(|p| p.noise_grey),
@@ -140,7 +136,6 @@ fn measure(picture: &GreyImage, hidden: f64) -> PictureCheck {
     let slope = 0.5 * (variance - noise_slope).max(0.0).sqrt();
     PictureCheck {
         decoded: 1,
-        used_bits: None,
         grey: if known > 0.0 { sum / known } else { 0.0 },
         clipped: 1.0 - known / pixels,
         noise_grey,

@@ -2,7 +2,6 @@
 
 use super::deformation::DeformationCheck;
 use super::result::Check;
-use super::unused_bits::unused_bits;
 
 /// Smallest overlap of neighbours, share of a frame, without a warning.
 const MIN_OVERLAP: f64 = 0.25;
@@ -24,9 +23,7 @@ pub(super) fn warnings(check: &Check) -> Vec<String> {
         None => of_poses(check),
     };
     let of_pictures = [
-        (check.pictures.used_bits)
-            .and_then(unused_bits)
-            .or_else(|| dark_frames(check)),
+        dark_frames(check),
         saturated_frames(check),
         weak_texture(check),
         uncovered_image(check),

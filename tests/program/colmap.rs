@@ -1,6 +1,7 @@
 //! COLMAP's models as COLMAP writes them: binary, and with poses of some of the frames only.
 
-use crate::support::{edit, fail, first_frames, succeed, text};
+use crate::support::{edit, fail, first_frames, simulate, succeed, text};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde_json::Value;
 use std::path::Path;
 use tempfile::TempDir;
@@ -179,4 +180,93 @@ fn a_camera_for_each_picture_is_shared_or_selected() {
     let toml = std::fs::read_to_string(dir.join("survey.toml")).unwrap();
     assert!(toml.contains("\nname = \"1\""), "{toml}");
     succeed(&["check", text(dir)]);
+}
+
+/// Moves the poses of a text model into another world, whose unit is `unit_m` metres.
+fn move_model(images: &Path, rotation: &UnitQuaternion<f64>, origin: &Vector3<f64>, unit_m: f64) {
+    let text = std::fs::read_to_string(images).unwrap();
+    let moved = |line: &str| {
+        let words: Vec<&str> = line.split(' ').collect();
+        if line.starts_with('#') || words.len() < 10 {
+            return line.to_owned();
+        }
+        let v: Vec<f64> = words[1..8]
+            .iter()
+            .map(|word| word.parse().unwrap())
+            .collect();
+        let r_cw = UnitQuaternion::from_quaternion(Quaternion::new(v[0], v[1], v[2], v[3]));
+        let r_cw = r_cw * rotation.inverse();
+        let t = Vector3::new(v[4], v[5], v[6]) / unit_m - r_cw * origin;
+        let q = r_cw.quaternion();
+        let numbers = [q.w, q.i, q.j, q.k, t.x, t.y, t.z].map(|number| number.to_string());
+        [
+            &[words[0].to_owned()],
+            &numbers[..],
+            &words[8..]
+                .iter()
+                .map(|w| (*w).to_owned())
+                .collect::<Vec<_>>(),
+        ]
+        .concat()
+        .join(" ")
+    };
+    let lines: Vec<String> = text.lines().map(moved).collect();
+    std::fs::write(images, lines.join("\n") + "\n").unwrap();
+}
+
+/// A binary model in a world and a unit of its own, with its pictures: the commands that `init` and
+/// `check` name lead to a panorama, and no file is edited by hand.
+#[test]
+fn a_model_of_any_axis_and_unit_becomes_a_panorama() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("survey");
+    simulate(&survey, &["--frames", "16", "--size", "240x180"]);
+    let sparse = survey.join("sparse/0");
+    let convert = [
+        "convert",
+        text(&survey),
+        "--poses",
+        "truth",
+        "--to",
+        "colmap",
+    ];
+    succeed(&[&convert[..], &["--out", text(&sparse)]].concat());
+    let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.7, -1.1, 2.0));
+    let origin = Vector3::new(3.0, -7.0, 1.5);
+    move_model(&sparse.join("images.txt"), &rotation, &origin, 1.6);
+    to_binary(&sparse);
+    for name in [
+        "survey.toml",
+        "camera.json",
+        "baseline.tum",
+        "groundtruth.tum",
+    ] {
+        std::fs::remove_file(survey.join(name)).unwrap();
+    }
+    let said = succeed(&["init", text(&survey), "--radius-m", "3"]);
+    assert!(said.contains("axis.json"), "{said}");
+    // The pictures tell the unit, to a tenth of a decade.
+    let checked = succeed(&["check", text(&survey), "--json"]);
+    let checked: Value = serde_json::from_str(&checked).unwrap();
+    let reading = checked["readings"]["readings"][0].as_str().unwrap();
+    let command = reading.split("tunnelstitch ").nth(1).unwrap();
+    let command = command.split(" writes").next().unwrap();
+    assert!(command.contains("--unit-m 1.58"), "{reading}");
+    let words: Vec<&str> = command.split(' ').chain([text(&survey)]).collect();
+    succeed(&words);
+    succeed(&["check", text(&survey)]);
+    let refined = dir.path().join("refined");
+    let said = succeed(&["refine", text(&survey), "--out", text(&refined)]);
+    assert!(said.contains("all 16 frames"), "{said}");
+    let wall = dir.path().join("wall.png");
+    let poses = refined.join("poses.tum");
+    succeed(&[
+        "stitch",
+        text(&survey),
+        "--poses",
+        text(&poses),
+        "--out",
+        text(&wall),
+    ]);
+    assert!(wall.exists());
 }

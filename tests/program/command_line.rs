@@ -190,3 +190,40 @@ fn a_hyphen_is_standard_input_or_output() {
     assert!(printed.status.success());
     assert_eq!(printed.stdout, std::fs::read(&output).unwrap());
 }
+
+/// A panorama is a stream, a folder of results is none.
+#[test]
+fn panoramas_are_printed_and_folders_are_not() {
+    let survey = first_frames(3);
+    let dir = survey.path();
+    let stitch = [
+        "stitch",
+        text(dir),
+        "--poses",
+        "truth",
+        "--px-per-metre",
+        "20",
+    ];
+    let file = dir.join("wall.png");
+    succeed(&[&stitch[..], &["--out", text(&file)]].concat());
+    let printed = tunnelstitch(&[&stitch[..], &["--out", "-"]].concat());
+    assert!(printed.status.success());
+    let [printed, written] = [printed.stdout, std::fs::read(&file).unwrap()]
+        .map(|bytes| image::load_from_memory(&bytes).unwrap());
+    assert_eq!(printed, written);
+    for more in [&["--json"][..], &["--seams"], &["--dry-run"]] {
+        let refused = tunnelstitch(&[&stitch[..], &["--out", "-"], more].concat());
+        assert_eq!(refused.status.code(), Some(2), "{more:?}");
+        assert!(refused.stdout.is_empty());
+    }
+    for command in ["refine", "report", "compare"] {
+        let refined = ["--refined", "truth"];
+        let refined = if command == "refine" {
+            &[][..]
+        } else {
+            &refined
+        };
+        let said = fail(&[&[command, text(dir), "--out", "-"], refined].concat(), 2);
+        assert!(said.contains("name a folder"), "{said}");
+    }
+}

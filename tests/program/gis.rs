@@ -87,7 +87,11 @@ fn panoramas_and_maps_lie_in_the_plane_of_chainage_and_arc_length() {
             );
         }
     }
-    assert_eq!(Tags::of(&wall).metadata, "");
+    let bands = Tags::of(&wall).metadata;
+    for (band, name) in ["red", "green", "blue", "alpha"].into_iter().enumerate() {
+        let item = format!("sample=\"{band}\" role=\"description\">{name}<");
+        assert!(bands.contains(&item), "no {item} in {bands}");
+    }
     let resolution = Tags::of(&maps.join("resolution.tif"));
     assert!(resolution.is_readable());
     let metadata = &resolution.metadata;

@@ -46,7 +46,7 @@ fn frames_are_taken_in_natural_order() {
 }
 
 #[test]
-fn twelve_bits_in_sixteen_are_named_and_read() {
+fn bits_of_files_of_sixteen_are_found_and_read() {
     let dir = tempfile::tempdir().unwrap();
     let survey = dir.path().join("survey");
     simulate(
@@ -60,14 +60,42 @@ fn twelve_bits_in_sixteen_are_named_and_read() {
         picture.pixels_mut().for_each(|pixel| pixel.0[0] >>= 4);
         picture.save(&path).unwrap();
     }
-    let (checked, warnings) = check(&survey);
-    assert_eq!(checked["pictures"]["used_bits"], 12);
-    assert!(warnings.contains("add bits = 12"), "{warnings}");
+    // They are read so by all commands without a word in survey.toml.
+    let (_, warnings) = check(&survey);
+    let confirmed = "bits = 12 under [frames] confirms it";
+    assert!(warnings.contains(confirmed), "{warnings}");
+    assert!((grey(&survey) - before).abs() < 0.1);
+    let mean = |picture: &DynamicImage| {
+        let values = picture.to_luma8().into_raw();
+        let shown: Vec<f64> = values
+            .iter()
+            .filter(|v| **v > 0)
+            .map(|v| f64::from(*v))
+            .collect();
+        shown.iter().sum::<f64>() / shown.len() as f64
+    };
+    let drawn = mean(&panorama(&survey));
+    assert!((drawn - before).abs() < 0.2 * before, "{drawn} {before}");
     let file = survey.join("survey.toml");
     edit(&file, "[frames]", "[frames]\nbits = 12");
     let (_, warnings) = check(&survey);
     assert!(!warnings.contains("bits"), "{warnings}");
     assert!((grey(&survey) - before).abs() < 0.1);
+    // Values of 8 bits that were saved as numbers of 16.
+    for path in frames(&survey) {
+        let mut picture = image::open(&path).unwrap().into_luma16();
+        picture.pixels_mut().for_each(|pixel| pixel.0[0] >>= 4);
+        picture.save(&path).unwrap();
+    }
+    edit(&file, "bits = 12\n", "");
+    assert!((grey(&survey) - before).abs() < 1.0);
+    edit(&file, "[frames]", "[frames]\nbits = 8");
+    assert!((grey(&survey) - before).abs() < 1.0);
+    for path in frames(&survey) {
+        let mut picture = image::open(&path).unwrap().into_luma16();
+        picture.pixels_mut().for_each(|pixel| pixel.0[0] <<= 4);
+        picture.save(&path).unwrap();
+    }
     succeed(&["init", text(&survey), "--radius-m", "3", "--force"]);
     let written = std::fs::read_to_string(&file).unwrap();
     assert!(written.contains("\nbits = 12"), "{written}");
@@ -195,4 +223,58 @@ fn float_tiff() -> Vec<u8> {
         .write_image::<tiff::encoder::colortype::Gray32Float>(480, 360, &values)
         .unwrap();
     bytes.into_inner()
+}
+
+/// Pictures that were turned for display and calibrated so, with poses of the camera as it stored
+/// them: the line that reads them so is named and mends it.
+#[test]
+fn poses_of_a_camera_before_its_pictures_were_turned_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("survey");
+    simulate(&survey, &["--frames", "14", "--size", "160x120"]);
+    for path in frames(&survey) {
+        let stored = image::open(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        write_jpeg(&path.with_extension("jpg"), &stored, 6);
+    }
+    edit(&survey.join("survey.toml"), "frames/*.png", "frames/*.jpg");
+    let camera = survey.join("camera.json");
+    let read = std::fs::read_to_string(&camera).unwrap();
+    let mut turned: serde_json::Value = serde_json::from_str(&read).unwrap();
+    for (a, b) in [("width", "height"), ("cx", "cy")] {
+        let (own, other) = (turned[a].clone(), turned[b].clone());
+        (turned[a], turned[b]) = (other, own);
+    }
+    std::fs::write(&camera, turned.to_string()).unwrap();
+    let (checked, warnings) = check(&survey);
+    let mend = "camera_axes = \"turned-right\"";
+    assert!(warnings.contains("turned-right"), "{warnings}");
+    let first = checked["readings"]["readings"][0].as_str().unwrap();
+    assert!(first.contains(mend), "{first}");
+    edit(
+        &survey.join("survey.toml"),
+        "[poses]",
+        &format!("[poses]\n{mend}"),
+    );
+    let (checked, _) = check(&survey);
+    assert!(checked["readings"].is_null(), "{checked}");
+}
+
+/// Of readings that the frames fit alike, the one that EXIF data ask for is named first.
+#[test]
+fn the_orientation_of_exif_data_is_named_before_others() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("survey");
+    simulate(&survey, &["--frames", "14", "--size", "160x120"]);
+    for path in frames(&survey) {
+        let stored = image::open(&path).unwrap().rotate180();
+        std::fs::remove_file(&path).unwrap();
+        write_jpeg(&path.with_extension("jpg"), &stored, 3);
+    }
+    edit(&survey.join("survey.toml"), "frames/*.png", "frames/*.jpg");
+    let (checked, _) = check(&survey);
+    let readings = checked["readings"]["readings"].as_array().unwrap();
+    assert!(readings.len() > 1, "{readings:?}");
+    let first = readings[0].as_str().unwrap();
+    assert!(first.contains("orientation = \"exif\""), "{first}");
 }

@@ -47,6 +47,9 @@ pub struct RefineInput<'a> {
     pub radius_sigma: f64,
     /// Radius of the tunnel, or half its width, as given; metres.
     pub nominal_radius_m: f64,
+    /// Length of a unit of the initial poses as it is taken, metres, if they are of a program whose
+    /// models have no scale of their own.
+    pub unscaled_unit_m: Option<f64>,
     /// True if the initial poses are those in the tunnel as built: a bend that points show does not
     /// carry them along.
     pub as_built: bool,
@@ -77,6 +80,7 @@ impl<'a> RefineInput<'a> {
             shape_sigma_m: DEFAULT_SHAPE_SIGMA_RADII * surface.perimeter_m() / TAU,
             radius_sigma: DEFAULT_SHAPE_SIGMA_RADII,
             nominal_radius_m: surface.perimeter_m() / TAU,
+            unscaled_unit_m: None,
             surface,
             frames,
             initial,
@@ -101,6 +105,7 @@ impl<'a> From<&'a Survey> for RefineInput<'a> {
             displacement: survey.displacement.as_ref(),
             shape_sigma_m: survey.shape_sigma_m,
             radius_sigma: survey.radius_sigma,
+            unscaled_unit_m: survey.unscaled_unit_m,
             frames: &survey.frames,
             initial: &survey.initial,
             pose_gaps: &survey.pose_gaps,

@@ -120,6 +120,6 @@ pub use uncertainty::model_error::ModelErrorReport;
 pub use uncertainty::rolling_shutter_test::ReadoutEstimate;
 pub use uncertainty::shape_report::{EstimatedShape, ScaleReport, ShapeReport, UnseenScaleReport};
 pub use verdict::length_scale::{LengthScale, RadiusSource};
-pub use verdict::prior_test::{PriorTest, ScaleTest, SigmaTest};
+pub use verdict::prior_test::{GivenLengths, PriorTest, ScaleTest, SigmaTest};
 pub use verdict::rig_report::MountReport;
 pub use verdict::survey_verdict::SurveyVerdict;

@@ -13,11 +13,11 @@ use crate::survey::Survey;
 use std::path::PathBuf;
 
 /// Files of a panorama.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct OutputArguments {
     /// The panorama. The extension chooses the format: .tif is a Cloud-Optimised GeoTIFF of any
     /// length, in metres; .png and .jpg are held in memory. A .jpg is black where no frame sees the
-    /// wall. With --seams and --shard, the folder of the parts.
+    /// wall. - writes a PNG on standard output. With --seams and --shard, the folder of the parts.
     #[arg(long, short, value_name = "FILE")]
     pub out: PathBuf,
     /// Also write a Deep Zoom picture for viewers in a browser. FILE must end in .dzi; its tiles
@@ -161,6 +161,14 @@ impl OutputArguments {
         let mut paths = self.options().paths();
         paths.insert(1, self.run_file());
         paths
+    }
+
+    /// The files with the panorama in another one.
+    pub fn with_panorama(&self, out: PathBuf) -> Self {
+        Self {
+            out,
+            ..self.clone()
+        }
     }
 
     /// Path of the record of the run.

@@ -166,6 +166,10 @@ enum AxesArgument {
     Ros,
     /// x right, y up, z forward, in a left-handed world.
     Unity,
+    /// x down, y left, z forward: pictures were turned clockwise after the camera stored them.
+    TurnedRight,
+    /// x up, y right, z forward: pictures were turned anticlockwise after that.
+    TurnedLeft,
 }
 
 /// Names of associations.
@@ -224,6 +228,8 @@ impl From<AxesArgument> for CameraAxes {
             AxesArgument::Opengl => Self::OpenGl,
             AxesArgument::Ros => Self::Ros,
             AxesArgument::Unity => Self::Unity,
+            AxesArgument::TurnedRight => Self::TurnedRight,
+            AxesArgument::TurnedLeft => Self::TurnedLeft,
         }
     }
 }

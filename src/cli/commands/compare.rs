@@ -1,6 +1,8 @@
 //! `tunnelstitch compare`: compares initial with refined poses.
 
-use crate::cli::arguments::{PictureArguments, PoseReadingArguments, input_file, positive};
+use crate::cli::arguments::{
+    PictureArguments, PoseReadingArguments, input_file, output_folder, positive,
+};
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
@@ -38,7 +40,7 @@ pub struct CompareArguments {
     #[arg(long, value_name = "DIR|FILE", value_parser = input_file())]
     refined: PathBuf,
     /// Folder for the results; created if missing.
-    #[arg(long, short, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR", value_parser = output_folder())]
     out: PathBuf,
     #[command(flatten)]
     picture: PictureArguments,

@@ -1,6 +1,8 @@
 //! `tunnelstitch converge`: measures the basin of convergence on simulated surveys.
 
-use crate::cli::arguments::{DeformationArguments, JitterArgument, WallArgument, picture_size};
+use crate::cli::arguments::{
+    DeformationArguments, JitterArgument, WallArgument, output_folder, picture_size,
+};
 use crate::cli::output::{DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::converge::{self, ConvergeOptions, SweepWall, TranslationScale};
 use crate::files::printed;
@@ -51,7 +53,7 @@ pub struct ConvergeArguments {
     #[arg(long, requires = "efficiency")]
     joint: bool,
     /// Folder for the results; created if missing. An unfinished sweep in it is continued.
-    #[arg(long, short, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR", value_parser = output_folder())]
     out: PathBuf,
     /// 1-σ of the rotation errors about each axis, degrees; a list.
     #[arg(

@@ -5,6 +5,7 @@ use super::overlay::leave_out_overlay;
 use super::refine_files::{check_outputs, stage_refined};
 use super::refine_summary::{OtherReadings, print_summary};
 use super::report::stage_report;
+use crate::cli::arguments::output_folder;
 use crate::cli::output::{DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::{Comparison, compare_survey};
 use crate::files::printed;
@@ -29,7 +30,13 @@ use std::time::Instant;
 )]
 pub struct DemoArguments {
     /// Folder for all output; created if missing.
-    #[arg(long, short, value_name = "DIR", default_value = "tunnelstitch-demo")]
+    #[arg(
+        long,
+        short,
+        value_name = "DIR",
+        default_value = "tunnelstitch-demo",
+        value_parser = output_folder()
+    )]
     out: PathBuf,
     /// Number of turns of the camera, twelve frames each.
     #[arg(

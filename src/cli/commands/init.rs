@@ -147,7 +147,7 @@ fn unknown_scale(found: &Discovery) -> Option<String> {
     });
     Some(format!(
         "{}: {:?} gives poses without a scale, and one unit is taken for 1 m; give the metres of a \
-         unit by --unit-m{length}",
+         unit by --unit-m{length}; if nobody knows it, check and refine find it by the radius",
         printed(path),
         poses.format
     ))

@@ -1,5 +1,6 @@
 //! `tunnelstitch plan-job`: plans the work of a network of surveys as a graph of tasks.
 
+use crate::cli::arguments::output_folder;
 use crate::cli::output::{Failure, Terminal, duration_text};
 use crate::files::printed;
 use crate::jobs::{Division, JOB_FILE, Job, JobFolder, Network, PlanOptions, SectionStep, plan};
@@ -27,7 +28,7 @@ pub struct PlanJobArguments {
     #[arg(value_name = "NETWORK|SURVEY")]
     network: PathBuf,
     /// Folder of the job, or its address on storage (s3://bucket/folder); created if missing.
-    #[arg(long, short, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR", value_parser = output_folder())]
     out: PathBuf,
     /// Steps of every section; a list. Without `refine`, the initial poses are used.
     #[arg(

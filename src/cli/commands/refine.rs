@@ -1,11 +1,9 @@
 //! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
 
-use crate::check::{
-    JOIN_SHARE, join_bytes, refine_bytes, refine_s, shard_bytes, shard_share, unused_bits_warning,
-};
+use crate::check::{JOIN_SHARE, join_bytes, refine_bytes, refine_s, shard_bytes, shard_share};
 use crate::cli::arguments::{
-    FollowArguments, PoseReadingArguments, ResumeArguments, input_file, positive, rate, resume,
-    share,
+    FollowArguments, PoseReadingArguments, ResumeArguments, input_file, output_folder, positive,
+    rate, resume, share,
 };
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::commands::refine_files::{
@@ -51,7 +49,7 @@ pub struct RefineArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
     /// Folder for the results; created if missing.
-    #[arg(long, short, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR", value_parser = output_folder())]
     out: PathBuf,
     /// Stop the last solve at the first step shorter than 0.1 px or twice the uncertainty, usually
     /// its first: faster, slightly less accurate.
@@ -227,9 +225,6 @@ pub fn run(
     check_memory(&survey, arguments.memory_bytes(&survey))?;
     if arguments.dry_run.is_set() {
         return describe(&survey, &options, arguments)?.print(terminal);
-    }
-    if let Some(warning) = unused_bits_warning(&survey) {
-        terminal.warn(warning);
     }
     let inputs = record::hash_survey(&survey, None)?;
     let origin = resume::origin(&survey, &options, inputs.clone())?;

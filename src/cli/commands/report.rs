@@ -1,6 +1,6 @@
 //! `tunnelstitch report`: writes an HTML report of a refined survey.
 
-use crate::cli::arguments::{PoseReadingArguments, positive};
+use crate::cli::arguments::{PoseReadingArguments, output_folder, positive};
 use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
@@ -31,7 +31,7 @@ pub struct ReportArguments {
     #[arg(long, value_name = "DIR|FILE")]
     refined: PathBuf,
     /// Folder for the report; created if missing.
-    #[arg(long, short, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR", value_parser = output_folder())]
     out: PathBuf,
     /// Resolution at which initial, refined and true poses are compared, pixels per metre of wall
     /// [default: the frames' own resolution at the wall, less for long surveys].

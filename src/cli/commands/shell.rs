@@ -1,5 +1,6 @@
 //! `tunnelstitch completions` and `tunnelstitch man`: shell completions and manual pages.
 
+use crate::cli::arguments::output_folder;
 use crate::cli::output::{Failure, Terminal, json};
 use crate::files::printed;
 use crate::persist::atomic::{self, WriteError};
@@ -22,7 +23,7 @@ pub struct CompletionsArguments {
 #[command(after_help = "Example:\n  tunnelstitch man --out ~/.local/share/man/man1")]
 pub struct ManArguments {
     /// Folder for the pages; created if missing.
-    #[arg(long, short, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR", value_parser = output_folder())]
     out: PathBuf,
 }
 

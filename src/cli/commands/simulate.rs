@@ -3,7 +3,7 @@
 use crate::camera::{Camera, Lens, read_calibration};
 use crate::cli::arguments::{
     AsBuiltArguments, DegradationArguments, ImagingArguments, JitterArgument, TunnelArguments,
-    WallArgument, input_file, numbers, picture_size, positive, view_angle,
+    WallArgument, input_file, numbers, output_folder, picture_size, positive, view_angle,
 };
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
@@ -46,7 +46,7 @@ pub struct SimulateArguments {
     #[arg(value_enum)]
     experiment: Experiment,
     /// Folder for the survey.
-    #[arg(long, short, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR", value_parser = output_folder())]
     out: PathBuf,
     /// Replace an earlier simulated survey in this folder.
     #[arg(long)]

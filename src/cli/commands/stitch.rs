@@ -8,7 +8,11 @@ use crate::cli::commands::overlay::leave_out_overlay;
 use crate::cli::commands::stitch_maps::MapInputs;
 use crate::cli::commands::stitch_run::StitchRun;
 use crate::cli::commands::stitch_shards::{SEAMS_FILE, join_shards, write_seams, write_shard};
-use crate::cli::output::{DryRunArguments, Failure, RunRecord, Terminal, record};
+use crate::cli::output::{
+    DryRunArguments, Failure, RunRecord, Terminal, is_stream, print_file, record,
+    refuse_two_results,
+};
+use crate::persist::atomic::ScratchFolder;
 use crate::persist::shard_number::ShardNumber;
 use crate::render::{PanoramaFileOptions, Stitch, StitchOptions};
 use crate::trajectory::poses_of;
@@ -73,7 +77,40 @@ pub fn run(
     record: &RunRecord,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    let (output, part) = (&arguments.output, arguments.part());
+    if is_stream(&arguments.output.out) {
+        return print_panorama(arguments, record, terminal);
+    }
+    draw(arguments, &arguments.output, record, terminal)
+}
+
+/// Draws the panorama into a scratch folder, and writes it on standard output as a PNG.
+fn print_panorama(
+    arguments: &StitchArguments,
+    record: &RunRecord,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    let output = &arguments.output;
+    refuse_two_results(&output.out, terminal)?;
+    if arguments.part().is_some() || arguments.join.is_some() || arguments.dry_run.is_set() {
+        return Err(Failure::usage(
+            "--out - writes a whole panorama on standard output; name a file or folder by --out \
+             with --seams, --shard, --join and --dry-run",
+        ));
+    }
+    let scratch = ScratchFolder::inside(&std::env::temp_dir())?;
+    let drawn = output.with_panorama(scratch.path().join("panorama.png"));
+    draw(arguments, &drawn, record, &Terminal::new(true, false))?;
+    print_file(&drawn.out)
+}
+
+/// Draws the panorama, or a part of it, into the files `output`.
+fn draw(
+    arguments: &StitchArguments,
+    output: &OutputArguments,
+    record: &RunRecord,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    let part = arguments.part();
     match (&part, &arguments.join) {
         (Some(_), _) => output.check_folder_of_parts()?,
         (None, Some(_)) => output.check_name_of_tiff()?,
@@ -95,7 +132,7 @@ pub fn run(
         &options,
     )?;
     let (canvas, format) = (*stitch.canvas(), stitch.frames().format());
-    let files = arguments.files();
+    let files = arguments.files(output);
     let budget = stitch.budget(files.pending_bytes(&canvas, format, layout))?;
     output.check_formats(&canvas, format, layout)?;
     let run = StitchRun {
@@ -168,8 +205,8 @@ impl StitchArguments {
     }
 
     /// Names and formats of the files; a part is one of a GeoTIFF.
-    fn files(&self) -> PanoramaFileOptions {
-        let files = self.output.options();
+    fn files(&self, output: &OutputArguments) -> PanoramaFileOptions {
+        let files = output.options();
         match self.part() {
             Some(part) => PanoramaFileOptions {
                 out: part.join(Path::new("panorama.tif")),

@@ -19,7 +19,16 @@ pub fn print(value: &impl Serialize) -> Result<(), Failure> {
 /// # Errors
 /// The errors of [`print()`].
 pub fn print_text(text: &str) -> Result<(), Failure> {
-    match std::io::stdout().write_all(text.as_bytes()) {
+    print_bytes(text.as_bytes())
+}
+
+/// Writes bytes on standard output.
+///
+/// # Errors
+/// The errors of [`print()`].
+pub(super) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout();
+    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
         // A closed pipe (`| head`) is not an error.
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(WriteError::new(Path::new("standard output"), error).into())

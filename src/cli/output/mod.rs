@@ -24,6 +24,6 @@ pub use paths::{
     check_parent_folder, own_program, picture_format, refuse_overwriting, survey_files,
 };
 pub use record::{RUN_FILE, RunRecord};
-pub use stream::{is_stream, refuse_two_results};
+pub use stream::{is_stream, print_file, refuse_two_results};
 pub use suggestion::{PosesReport, Suggestion, SuggestionArguments};
 pub use terminal::{Terminal, print_error};

@@ -1,7 +1,9 @@
 //! `-` as the name of a file: standard input or standard output.
 
 use super::failure::Failure;
+use super::json::print_bytes;
 use super::terminal::Terminal;
+use crate::persist::atomic::WriteError;
 use std::path::Path;
 
 /// True for `-`, the name of standard input or standard output.
@@ -21,4 +23,13 @@ pub fn refuse_two_results(out: &Path, terminal: &Terminal) -> Result<(), Failure
         ));
     }
     Ok(())
+}
+
+/// Writes the content of a file on standard output.
+///
+/// # Errors
+/// A file that cannot be read; a standard output that is full.
+pub fn print_file(path: &Path) -> Result<(), Failure> {
+    let bytes = std::fs::read(path).map_err(|source| WriteError::new(path, source))?;
+    print_bytes(&bytes)
 }

@@ -7,8 +7,8 @@ use std::ops::RangeInclusive;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Bits of the brightest value in files of 16 bits by which the upper bits are empty: cameras of 10
-/// to 14 bits often leave them so.
-pub const UNUSED_UPPER_BITS: RangeInclusive<u32> = 9..=14;
+/// to 14 bits often leave them so, and programs that save values of 8 bits as numbers of 16.
+pub const UNUSED_UPPER_BITS: RangeInclusive<u32> = 8..=14;
 
 /// Number of frames that are decoded at a time.
 const FRAMES_AT_A_TIME: usize = 12;

@@ -4,7 +4,7 @@ use super::compression::Compression;
 use super::compression::Packed;
 use super::directory::{self, Directory, Values, tag};
 use super::error::RasterError;
-use super::geo_tags::{geo_tags, quantity_tag};
+use super::geo_tags::{bands_tag, geo_tags};
 use super::overviews::{LevelTile, OverviewBuilder, Waiting};
 use super::spec::{Nodata, RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
 use super::spool::{Spool, Stored};
@@ -294,8 +294,8 @@ impl CogWriter {
         if let Some(georeference) = spec.georeference.filter(|_| level == 0) {
             tags.extend(geo_tags(&georeference));
         }
-        if let Some(quantity) = spec.quantity.filter(|_| level == 0) {
-            tags.push(quantity_tag(quantity));
+        if level == 0 {
+            tags.push(bands_tag(spec, alpha));
         }
         tags.sort_by_key(|&(number, _)| number);
         tags

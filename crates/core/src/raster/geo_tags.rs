@@ -4,7 +4,7 @@
 //! GTiff reads from key 3073 (`gt_wkt_srs.cpp`); GDAL's metadata in TIFF files (tag 42112).
 
 use super::directory::{Values, tag};
-use super::spec::{Georeference, Quantity};
+use super::spec::{Georeference, Quantity, RasterSpec};
 
 /// "User-defined" as the value of a key.
 const USER_DEFINED: u16 = 32767;
@@ -68,14 +68,27 @@ fn coordinate_system(georeference: &Georeference) -> String {
     )
 }
 
-/// Name and unit of the first band, as GDAL reads them.
-pub(super) fn quantity_tag(quantity: Quantity) -> (u16, Values) {
-    let item = |name: &str, role: &str, text: &str| {
-        format!("  <Item name=\"{name}\" sample=\"0\" role=\"{role}\">{text}</Item>\n")
+/// Names and units of the bands, as GDAL reads them: the quantity, or brightness or colours, and
+/// the alpha if the pixels hold one.
+pub(super) fn bands_tag(spec: &RasterSpec, has_alpha: bool) -> (u16, Values) {
+    let item = |band: usize, name: &str, role: &str, text: &str| {
+        format!("  <Item name=\"{name}\" sample=\"{band}\" role=\"{role}\">{text}</Item>\n")
     };
-    let mut items = item("DESCRIPTION", "description", quantity.name);
-    if !quantity.unit.is_empty() {
-        items += &item("UNITTYPE", "unittype", quantity.unit);
+    let plain = |name: &'static str| Quantity { name, unit: "" };
+    let channels = match (spec.quantity, spec.channels) {
+        (Some(quantity), _) => vec![quantity],
+        (None, 1) => vec![plain("grey")],
+        (None, _) => ["red", "green", "blue"].map(plain).to_vec(),
+    };
+    let bands = channels
+        .into_iter()
+        .chain(has_alpha.then_some(plain("alpha")));
+    let mut items = String::new();
+    for (band, Quantity { name, unit }) in bands.enumerate() {
+        items += &item(band, "DESCRIPTION", "description", name);
+        if !unit.is_empty() {
+            items += &item(band, "UNITTYPE", "unittype", unit);
+        }
     }
     let text = format!("<GDALMetadata>\n{items}</GDALMetadata>\n");
     (tag::GDAL_METADATA, Values::Ascii(text))
@@ -84,6 +97,7 @@ pub(super) fn quantity_tag(quantity: Quantity) -> (u16, Values) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::test_picture::grey_alpha;
 
     #[test]
     fn a_turned_picture_has_its_steps_in_the_columns_of_the_matrix() {
@@ -111,16 +125,44 @@ mod tests {
 
     #[test]
     fn plain_numbers_have_no_unit() {
-        let text = |unit| match quantity_tag(Quantity {
-            name: "share",
-            unit,
-        })
-        .1
-        {
-            Values::Ascii(text) => text,
-            other => panic!("{other:?}"),
+        let text = |unit| {
+            let quantity = Some(Quantity {
+                name: "share",
+                unit,
+            });
+            written(&RasterSpec {
+                quantity,
+                ..grey_alpha(9, 9)
+            })
         };
         assert!(text("mm").contains("role=\"unittype\">mm</Item>"));
         assert!(!text("").contains("UNITTYPE") && text("").contains(">share</Item>"));
+    }
+
+    fn written(spec: &RasterSpec) -> String {
+        match bands_tag(spec, spec.alpha).1 {
+            Values::Ascii(text) => text,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn bands_of_pictures_are_named_in_their_order() {
+        let grey = grey_alpha(9, 9);
+        let colour = RasterSpec {
+            channels: 3,
+            ..grey
+        };
+        for (spec, names) in [
+            (&grey, &["grey", "alpha"][..]),
+            (&colour, &["red", "green", "blue", "alpha"]),
+        ] {
+            let text = written(spec);
+            for (band, name) in names.iter().enumerate() {
+                let item = format!("sample=\"{band}\" role=\"description\">{name}<");
+                assert!(text.contains(&item), "no {item} in {text}");
+            }
+            assert_eq!(text.matches("<Item").count(), names.len());
+        }
     }
 }

@@ -133,7 +133,7 @@ pub struct FramesSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mask: Option<PathBuf>,
     /// Bits of the values in picture files of 16 bits: 12 where cameras leave the upper four empty;
-    /// 16 by default.
+    /// by default those of the brightest value of all frames, if it leaves upper bits empty.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bits: Option<u8>,
     /// Orientation of pictures that are to be turned for display; by default as stored, unless the
@@ -207,9 +207,37 @@ pub(super) fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
             path: path.to_owned(),
             line,
             column,
-            what: format!("{}{}", error.message().replace('\n', " "), slip(&text, at)),
+            what: format!(
+                "{}{}{}",
+                error.message().replace('\n', " "),
+                slip(&text, at),
+                meant_key(error.message())
+            ),
         }
     })
+}
+
+/// The keys that an unknown one is the beginning of, as `radius` of `radius_m`, or the plural of;
+/// empty if there are none.
+fn meant_key(message: &str) -> String {
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let Some(given) = quoted
+        .next()
+        .filter(|_| message.starts_with("unknown field"))
+    else {
+        return String::new();
+    };
+    let is_meant = |known: &&str| {
+        known.starts_with(given) || given.strip_suffix('s').is_some_and(|one| one == *known)
+    };
+    let meant: Vec<String> = quoted
+        .filter(is_meant)
+        .map(|key| format!("`{key}`"))
+        .collect();
+    match meant.is_empty() {
+        true => String::new(),
+        false => format!("; `{given}` may mean {}", meant.join(" or ")),
+    }
 }
 
 /// The remedy of a slip at a byte where a text stops to be TOML; empty if it is none that people
@@ -326,5 +354,10 @@ mod tests {
             message.contains("survey.toml:3:3: unknown field `raduis_m`"),
             "{message}"
         );
+        assert!(!message.contains("may mean"), "{message}");
+        std::fs::write(&path, "[tunnel]\nshape = \"circle\"\nradius = 3.0\n").unwrap();
+        let message = Survey::open(dir.path()).unwrap_err().to_string();
+        let meant = "`radius` may mean `radius_m` or `radius_sigma_percent`";
+        assert!(message.contains(meant), "{message}");
     }
 }

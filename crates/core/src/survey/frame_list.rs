@@ -3,13 +3,17 @@
 use super::error::SurveyError;
 use super::file::FramesSection;
 use super::frame_times;
-use crate::frames::{self, FrameFile, PictureOrientation, PictureReading, RecordedImages, Video};
+use crate::frames::{
+    self, FrameFile, PictureOrientation, PictureReading, RecordedImages, UNUSED_UPPER_BITS, Video,
+    brightest_bits,
+};
 use crate::storage::{Mirror, StorageUrl};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::trajectory::CameraAxes;
 
 /// The frames that a `[frames]` section names.
 pub(super) struct FrameList {
@@ -21,17 +25,24 @@ pub(super) struct FrameList {
     pub video: Option<Arc<Video>>,
 }
 
+/// The largest value of so many bits, 1 to 16.
+fn white(bits: u8) -> u16 {
+    u16::MAX >> (16 - bits)
+}
+
 /// The reading of picture files that a section asks for.
 ///
 /// # Errors
 /// A number of bits that no file has, in words.
 fn picture_reading(section: &FramesSection) -> Result<PictureReading, &'static str> {
     let bits = section.bits.unwrap_or(16);
-    if !(9..=16).contains(&bits) {
-        return Err("frames.bits must be between 9 and 16; files of 8 bits need none");
+    if !(8..=16).contains(&bits) {
+        return Err(
+            "frames.bits must be between 8 and 16, those of the values in files of 16 bits",
+        );
     }
     Ok(PictureReading {
-        white: u16::MAX >> (16 - bits),
+        white: white(bits),
         orientation: section.orientation.unwrap_or_default(),
     })
 }
@@ -176,6 +187,7 @@ impl FrameList {
         let Some(first) = named.first.map(|k| &self.frames[k]) else {
             return (self, None);
         };
+        let number = named.only();
         let named = named.sentence(&printed(first.file()).to_string());
         let turned = PictureReading {
             orientation: PictureOrientation::Exif,
@@ -187,7 +199,35 @@ impl FrameList {
             let frames = self.frames.into_iter();
             self.frames = frames.map(|frame| frame.with_reading(turned)).collect();
         }
-        (self, Some(orientation_warning(&named, is_turned)))
+        let axes = number.and_then(CameraAxes::before_turning);
+        (self, Some(orientation_warning(&named, is_turned, axes)))
+    }
+
+    /// The bits of the brightest value of all frames of lists, if that leaves the upper bits of
+    /// their files of 16 bits empty and the section does not say what these hold; `size` is that of
+    /// the calibrations, pixels.
+    pub fn used_bits(lists: &[Self], size: (u32, u32), section: &FramesSection) -> Option<u8> {
+        if section.bits.is_some() {
+            return None;
+        }
+        let of_lists = lists.iter().map(|list| brightest_bits(&list.frames, size));
+        let brightest = of_lists.flatten().max()?;
+        let bits = UNUSED_UPPER_BITS.contains(&brightest).then_some(brightest);
+        bits.and_then(|bits| bits.try_into().ok())
+    }
+
+    /// The frames with values of so many bits in files of 16.
+    pub fn with_bits(mut self, bits: u8) -> Self {
+        let frames = self.frames.into_iter();
+        let read = frames.map(|frame| match frame.reading() {
+            Some(reading) => frame.with_reading(PictureReading {
+                white: white(bits),
+                ..reading
+            }),
+            None => frame,
+        });
+        self.frames = read.collect();
+        self
     }
 
     fn of_images(listed: Vec<FrameFile>, reading: PictureReading) -> Self {
@@ -252,6 +292,12 @@ impl NamedOrientations {
         }
     }
 
+    /// The orientation, if there is one.
+    fn only(&self) -> Option<u8> {
+        let number = self.counts.keys().next().copied();
+        number.filter(|_| self.counts.len() == 1)
+    }
+
     /// The orientations, in words; `file`: the first frame with one.
     fn sentence(&self, file: &str) -> String {
         let counts: Vec<String> = self
@@ -273,13 +319,19 @@ impl NamedOrientations {
     }
 }
 
-/// The warning that pictures whose EXIF data name an orientation are turned, or that they are not.
-fn orientation_warning(named: &str, is_turned: bool) -> String {
+/// The warning that pictures whose EXIF data name an orientation are turned, or that they are not;
+/// `axes`: those of the camera with the pictures as stored.
+fn orientation_warning(named: &str, is_turned: bool, axes: Option<CameraAxes>) -> String {
     if is_turned {
+        let otherwise = axes.map(|axes| {
+            let name = axes.name();
+            format!(" (if they are not, camera_axes = \"{name}\" under [poses])")
+        });
         format!(
             "{named}, which is done, since the calibration fits only that; the poses must be \
-             those of the camera turned likewise; orientation = \"exif\" under [frames] confirms \
-             it"
+             those of the camera turned likewise{}; orientation = \"exif\" under [frames] confirms \
+             it",
+            otherwise.unwrap_or_default()
         )
     } else {
         format!(
@@ -288,6 +340,14 @@ fn orientation_warning(named: &str, is_turned: bool) -> String {
              \"exif\" under [frames], otherwise orientation = \"stored\""
         )
     }
+}
+
+/// The warning that values of files of 16 bits are read as of the bits that they use.
+pub(super) fn bits_warning(bits: u8) -> String {
+    format!(
+        "the frames have files of 16 bits, but no value of more than {bits} bits, and are read \
+         so; bits = {bits} under [frames] confirms it, and saves looking at all of them"
+    )
 }
 
 #[cfg(test)]

@@ -56,6 +56,9 @@ pub struct Survey {
     pub skipped: Vec<SkippedFrame>,
     /// The initial poses, one per frame.
     pub initial: Trajectory,
+    /// Length of a unit of the initial poses as it is taken, metres, if they are of a program
+    /// whose models have no scale of their own.
+    pub unscaled_unit_m: Option<f64>,
     /// The frames that the file of the initial poses leaves out, and whose initial poses are
     /// interpolated.
     pub pose_gaps: Vec<PoseGap>,
@@ -78,6 +81,8 @@ pub struct Survey {
 pub(super) struct ReadPoses {
     /// The poses.
     pub trajectory: Trajectory,
+    /// True if the file's program has models without a scale of their own.
+    pub has_no_scale: bool,
     /// The frames that the file leaves out.
     pub gaps: Vec<PoseGap>,
     /// Warnings about suspicious poses.
@@ -142,8 +147,10 @@ impl Survey {
             skipped,
             times_s,
             video,
+            bits,
             warnings: picture_warnings,
         } = place.take_frames(surface.as_ref())?;
+        file.frames.bits = bits.or(file.frames.bits);
         if let Some(video) = &video {
             check_displayed_rows(video, &file).map_err(value)?;
         }
@@ -161,6 +168,7 @@ impl Survey {
             frames,
             skipped,
             initial: Vec::new(),
+            unscaled_unit_m: None,
             pose_gaps: Vec::new(),
             truth: None,
             prior: file.prior.into(),
@@ -195,6 +203,8 @@ impl Survey {
         );
         (survey.initial, survey.truth, survey.warnings) = (initial, truth, warnings);
         survey.pose_gaps = read.gaps;
+        let unit_m = survey.file.poses.unit_m.unwrap_or(1.0);
+        survey.unscaled_unit_m = read.has_no_scale.then_some(unit_m);
         survey.validate_readout().map_err(value)?;
         Ok(survey)
     }
@@ -297,6 +307,7 @@ impl Survey {
         warnings.extend(in_conflict);
         Ok(ReadPoses {
             trajectory: in_turn(&of_cameras),
+            has_no_scale: reading.format.has_no_scale(),
             gaps: reading.gaps,
             warnings,
         })

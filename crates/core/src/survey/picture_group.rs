@@ -193,6 +193,8 @@ mod tests {
         };
         assert_eq!(bits(4000), Some(12));
         assert_eq!(bits(40000), None);
-        assert_eq!(bits(200), None);
+        // Values of 8 bits, and dark pictures.
+        assert_eq!(bits(200), Some(8));
+        assert_eq!(bits(100), None);
     }
 }

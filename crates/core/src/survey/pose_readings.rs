@@ -11,6 +11,8 @@ use super::pose_validation::feasible_conventions;
 use super::poses_section::PosesSection;
 use crate::frames::PictureOrientation;
 use nalgebra::{Quaternion, UnitQuaternion};
+use std::ops::RangeInclusive;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{
     AngleUnit, CameraAxes, Convention, EulerSequence, Pose, PoseFormat, StampedPose, Trajectory,
@@ -39,6 +41,10 @@ const OTHER_RADIUS_FACTORS: [f64; 4] = [0.4, 0.63, 1.58, 2.5];
 /// Prior of a radius that is off by a factor without a name, nats: one in twenty.
 const OTHER_RADIUS_NATS: f64 = -3.0;
 
+/// Units of poses without a scale, tenths of a decade from the one that is taken: `refine` finds
+/// what lies between them.
+const UNIT_TENTHS: RangeInclusive<i32> = -8..=8;
+
 /// Places that poses may be off by, later or earlier.
 const SHIFTS: [isize; 6] = [1, -1, 2, -2, 3, -3];
 
@@ -60,6 +66,8 @@ pub struct PoseReading {
     pub remedy: String,
     /// Number of its changes to the reading given.
     pub changes: usize,
+    /// True if the pictures' files ask for it themselves, in their EXIF data.
+    pub is_stated: bool,
     /// Natural logarithm of its prior odds to a slip that people make often.
     pub prior_nats: f64,
     /// The initial poses.
@@ -78,6 +86,7 @@ impl PoseReading {
         Self {
             remedy,
             changes,
+            is_stated: false,
             prior_nats: 0.0,
             initial,
             orientation: PictureOrientation::Stored,
@@ -122,7 +131,9 @@ impl Survey {
             let initial = given.trajectory_in(&convention);
             PoseReading::of_poses(flags.join(" and "), flags.len(), initial)
         });
+        let exif = self.exif_orientation();
         let poses = conventions
+            .chain(exif.and_then(|number| self.of_stored_pictures(&given, number)))
             .chain(other_texts(section, &given))
             .chain(self.other_angles())
             .chain(self.shifted_readings(&given))
@@ -134,14 +145,20 @@ impl Survey {
         // Pictures of videos are displayed as they should be.
         let has_files = self.frames.iter().all(|frame| frame.reading().is_some());
         let orientations = ORIENTATIONS.into_iter().filter(|_| has_files);
-        let pictures = orientations.map(|(name, orientation)| PoseReading {
-            remedy: format!(
-                "{name} (orientation = \"{}\" under [frames])",
-                orientation.name()
-            ),
-            changes: 1,
-            orientation,
-            ..as_given.clone()
+        let pictures = orientations.map(|(name, orientation)| {
+            let is_stated =
+                !self.has_turned_pictures() && exif.and_then(of_exif) == Some(orientation);
+            let (name, asked) = match is_stated {
+                true => ("the pictures turned as EXIF says", PictureOrientation::Exif),
+                false => (name, orientation),
+            };
+            PoseReading {
+                remedy: format!("{name} (orientation = \"{}\" under [frames])", asked.name()),
+                changes: 1,
+                is_stated,
+                orientation,
+                ..as_given.clone()
+            }
         });
         let cameras = self.camera_readings().into_iter();
         let cameras = cameras.map(|(remedy, camera)| PoseReading {
@@ -152,9 +169,45 @@ impl Survey {
         });
         let others = poses
             .chain(self.other_radii(given.format))
+            .chain(self.other_scales(given.format))
             .chain(pictures)
             .chain(cameras);
         Ok(std::iter::once(as_given.clone()).chain(others).collect())
+    }
+
+    /// The EXIF orientation, if all frames have the same, and another than as stored.
+    fn exif_orientation(&self) -> Option<u8> {
+        let files = self
+            .frames
+            .iter()
+            .all(|frame| frame.shared_file().is_none());
+        let looked_at = if files { self.frames.len() } else { 1 };
+        let frames = self.frames.get(..looked_at)?;
+        let numbers = frames.par_map(|frame| frame.exif_orientation().ok().flatten());
+        let first = numbers.first().copied().flatten();
+        first.filter(|_| numbers.iter().all(|number| *number == first))
+    }
+
+    /// The reading of poses as those of the camera with its pictures as it stored them, where these
+    /// are turned by a quarter as the EXIF orientation `number` asks.
+    fn of_stored_pictures(&self, given: &InterpretedPoses, number: u8) -> Option<PoseReading> {
+        let axes = CameraAxes::before_turning(number)?;
+        let is_other = self.has_turned_pictures() && given.convention.axes == CameraAxes::OpenCv;
+        let convention = Convention {
+            axes,
+            ..given.convention
+        };
+        is_other.then(|| {
+            let name = axes.name();
+            let remedy = format!(
+                "poses of the camera that stored the pictures before they were turned \
+                 (camera_axes = \"{name}\" under [poses])"
+            );
+            PoseReading {
+                is_stated: true,
+                ..PoseReading::of_poses(remedy, 1, given.trajectory_in(&convention))
+            }
+        })
     }
 
     /// True if pictures are turned as their EXIF data ask.
@@ -167,10 +220,8 @@ impl Survey {
     /// given one, seen from positions that are scaled about its axis. Poses without a scale say
     /// nothing of it.
     fn other_radii(&self, format: PoseFormat) -> impl Iterator<Item = PoseReading> {
-        let tunnel = &self.file.tunnel;
-        let is_straight = tunnel.centreline.is_none() && self.bend.is_none();
         let has_scale = self.file.poses.unit_m.is_some() || !format.has_no_scale();
-        let radius_m = tunnel.radius_m.filter(|_| is_straight && has_scale);
+        let radius_m = self.file.tunnel.radius_m.filter(|_| has_scale);
         let slips = RADIUS_SLIPS.map(|(factor, what)| (factor, what.to_owned(), 0.0));
         let others = OTHER_RADIUS_FACTORS.map(|factor| {
             let what = format!("of about {factor} times the given radius");
@@ -179,18 +230,42 @@ impl Survey {
         let all = slips.into_iter().chain(others);
         all.filter_map(move |(factor, what, prior_nats)| {
             let radius_m = rounded(factor * radius_m?);
-            let scaled = |stamped: &StampedPose| StampedPose {
-                pose: Pose::new(stamped.pose.r_wc, stamped.pose.t_wc / factor),
-                ..*stamped
-            };
             let remedy = format!("a tunnel {what} (radius_m = {radius_m} under [tunnel])");
-            let initial = self.initial.iter().map(scaled).collect();
-            let reading = PoseReading {
+            let reading = self.scaled(1.0 / factor, remedy)?;
+            Some(PoseReading {
                 prior_nats,
-                ..PoseReading::of_poses(remedy, 1, initial)
-            };
-            is_inside(self.surface.as_ref(), &reading.initial).then_some(reading)
+                ..reading
+            })
         })
+    }
+
+    /// Readings in other units of poses that have no scale of their own, whose unit nobody gave.
+    fn other_scales(&self, format: PoseFormat) -> impl Iterator<Item = PoseReading> {
+        let is_unknown = self.file.poses.unit_m.is_none() && format.has_no_scale();
+        let radius_m = self.file.tunnel.radius_m.filter(|_| is_unknown);
+        let tenths = UNIT_TENTHS.filter(|tenths| *tenths != 0);
+        tenths.filter_map(move |tenths| {
+            let radius_m = radius_m?;
+            let unit_m = (10f64.powf(0.1 * f64::from(tenths)) * 100.0).round() / 100.0;
+            let remedy = format!(
+                "a unit of the poses of about {unit_m} m (tunnelstitch init --force --radius-m \
+                 {radius_m} --unit-m {unit_m} writes it, with the axis)"
+            );
+            self.scaled(unit_m, remedy)
+        })
+    }
+
+    /// The reading with positions scaled about the axis of a straight tunnel, if they are inside.
+    fn scaled(&self, factor: f64, remedy: String) -> Option<PoseReading> {
+        let is_straight = self.file.tunnel.centreline.is_none() && self.bend.is_none();
+        let scaled = |stamped: &StampedPose| StampedPose {
+            pose: Pose::new(stamped.pose.r_wc, stamped.pose.t_wc * factor),
+            ..*stamped
+        };
+        let initial = self.initial.iter().map(scaled).collect();
+        let reading = PoseReading::of_poses(remedy, 1, initial);
+        let is_inside = is_inside(self.surface.as_ref(), &reading.initial);
+        (is_straight && is_inside).then_some(reading)
     }
 
     /// Readings of angles in the other unit, where that is given, and in the reverse order.
@@ -248,6 +323,16 @@ impl Survey {
             })
         };
         wanted.filter_map(reading).collect()
+    }
+}
+
+/// The orientation that the EXIF orientation `number` asks for, if it leaves the size as it is.
+fn of_exif(number: u8) -> Option<PictureOrientation> {
+    match number {
+        2 => Some(PictureOrientation::Mirrored),
+        3 => Some(PictureOrientation::Turned180),
+        4 => Some(PictureOrientation::Flipped),
+        _ => None,
     }
 }
 
@@ -313,7 +398,7 @@ mod tests {
         assert!(read.r_wc.angle_to(&right) < 1e-12);
     }
 
-    /// A model of structure from motion has any size, whatever the radius.
+    /// A model of structure from motion has any size, whatever the radius: its unit is in question.
     #[test]
     fn poses_without_a_scale_say_nothing_of_the_radius() {
         let fixture = std::path::Path::new("../../fixtures/blender_free48");
@@ -322,6 +407,9 @@ mod tests {
         let all = RADIUS_SLIPS.len() + OTHER_RADIUS_FACTORS.len();
         assert_eq!(radii(PoseFormat::Tum), all);
         assert_eq!(radii(PoseFormat::Colmap), 0);
+        let units = |format| survey.other_scales(format).count();
+        assert_eq!(units(PoseFormat::Tum), 0);
+        assert!(units(PoseFormat::Colmap) > 8);
         let change = |file: &mut crate::survey::SurveyFile| file.poses.unit_m = Some(1.0);
         let with_unit = Survey::open_with(fixture, change).unwrap();
         let count = with_unit.other_radii(PoseFormat::Colmap).count();

@@ -179,6 +179,22 @@ impl MotionDirections {
     }
 }
 
+/// The line of motion of cameras that go on rotating about one axis, if they have one, towards the
+/// last; a unit vector.
+pub(super) fn line_of_revolving(poses: &[Pose]) -> Option<Vector3<f64>> {
+    let course = MotionDirections::of(poses);
+    let revolves = course.revolves && course.turning.is_some();
+    course.motion.filter(|_| revolves)
+}
+
+/// True if camera centres extend along a direction, a unit vector, as along a line of motion.
+pub(super) fn extend_along(centres: &[Vector3<f64>], direction: &Vector3<f64>) -> bool {
+    let middle = centres.iter().sum::<Vector3<f64>>() / centres.len().max(1) as f64;
+    let off = || centres.iter().map(|centre| centre - middle);
+    let along: f64 = off().map(|off| off.dot(direction).powi(2)).sum();
+    along > MIN_LINE_FRACTION * off().map(|off| off.norm_squared()).sum::<f64>()
+}
+
 /// The eigenvector of the largest eigenvalue, if that has at least `share` of the trace.
 fn main_direction(moments: &Matrix3<f64>, share: f64) -> Option<Vector3<f64>> {
     if !moments.iter().all(|value| value.is_finite()) {

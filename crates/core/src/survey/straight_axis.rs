@@ -3,6 +3,7 @@
 //! Programs of structure from motion place a model anywhere, along any axis. In a straight tunnel,
 //! a camera that moves along it, or that revolves about its axis, tells where the axis is.
 
+use super::pose_validation::{extend_along, line_of_revolving};
 use alphanumeric_sort::compare_str;
 use nalgebra::Vector3;
 use tunnelstitch_geometry::trajectory::{
@@ -30,9 +31,10 @@ pub struct FoundAxis {
 }
 
 impl FoundAxis {
-    /// The tunnel's axis if poses are of structure from motion and on a straight line that is not
-    /// the world's y axis already. `unit_m` is the length of a unit of the poses, metres, 1 if it
-    /// is not known; `radius_m` the tunnel's radius, if it is known.
+    /// The tunnel's axis if poses are of structure from motion and on a straight line, or of
+    /// cameras that revolve, and the line is not the world's y axis already. `unit_m` is the length
+    /// of a unit of the poses, metres, 1 if it is not known; `radius_m` the tunnel's radius, if it
+    /// is known.
     pub(super) fn of(file: &PoseFile, unit_m: Option<f64>, radius_m: Option<f64>) -> Option<Self> {
         if !file.format.has_arbitrary_world() {
             return None;
@@ -40,20 +42,25 @@ impl FoundAxis {
         let has_scale = unit_m.is_some() || !file.format.has_no_scale();
         let unit_m = unit_m.unwrap_or(1.0);
         let poses = world_poses(file);
-        let found = Self::along(&poses, unit_m)?;
+        let centres: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.t_wc).collect();
+        let straight = StraightPath::of(&centres);
+        // Cameras that revolve show the axis by their way, even where they drift about it.
+        let drifting = || StraightPath::along(&centres, line_of_revolving(&poses)?);
+        let is_along_y = match &straight {
+            Some(path) => path.direction.y.abs() > MAX_TILT_RAD.cos(),
+            None => extend_along(&centres, &Vector3::y()),
+        };
+        let found = Self::on(straight.or_else(drifting)?, &poses, unit_m);
         let is_inside = |distance: f64| radius_m.is_none_or(|r| distance * unit_m < r);
         let off_y = poses.iter().map(|pose| pose.t_wc.xz().norm());
-        let is_in_tunnel = found.path.direction.y.abs() > MAX_TILT_RAD.cos()
-            && is_inside(off_y.fold(0.0, f64::max));
+        let is_in_tunnel = is_along_y && is_inside(off_y.fold(0.0, f64::max));
         let is_possible = !has_scale || is_inside(found.path.max_distance);
         (!is_in_tunnel && is_possible).then_some(found)
     }
 
-    /// The axis along the line through poses in their order; chainage 0 is at the first one.
-    fn along(poses: &[Pose], unit_m: f64) -> Option<Self> {
-        let centres: Vec<Vector3<f64>> = poses.iter().map(|pose| pose.t_wc).collect();
-        let path = StraightPath::of(&centres)?;
-        Some(Self {
+    /// The axis on the line through poses in their order; chainage 0 is at the first one.
+    fn on(path: StraightPath, poses: &[Pose], unit_m: f64) -> Self {
+        Self {
             axis: TunnelAxis {
                 point_m: rounded(path.start * unit_m),
                 axis: rounded(path.direction),
@@ -61,7 +68,7 @@ impl FoundAxis {
             },
             path,
             poses: poses.len(),
-        })
+        }
     }
 }
 
@@ -181,5 +188,42 @@ mod tests {
             entry.pose = Pose::new(pose.r_wc, pose.t_wc.zxy() + arm.zxy());
         }
         assert_eq!(found(revolving, None, None).axis, None);
+    }
+
+    /// A camera that revolves and drifts off the axis as it advances.
+    fn revolving(frame: &Pose) -> PoseFile {
+        let mut poses = elsewhere(frame, 1.0);
+        let drift = |k: usize| Vector3::new(0.05, 0.0, -0.08) * (k as f64 / 5.0).sin();
+        for (k, (entry, own)) in poses
+            .entries
+            .iter_mut()
+            .zip(spiral(30, 0.1, 0.5))
+            .enumerate()
+        {
+            let pose = frame.after(&Pose::new(own.r_wc, own.t_wc + drift(k)));
+            entry.pose = CameraAxes::OpenGl.turn(&pose);
+            entry.name = Some(format!("f{k}.png"));
+        }
+        poses
+    }
+
+    #[test]
+    fn revolving_cameras_show_the_axis_by_their_way() {
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.7, -1.1, 2.0));
+        let frame = Pose::new(rotation, Vector3::new(5.0, -3.0, 2.0));
+        let discovery = found(revolving(&frame), Some(1.0), Some(3.0));
+        let axis = discovery.axis.unwrap().axis;
+        let direction = rotation.inverse() * Vector3::from(axis.axis);
+        // From one end of the drift, 0.094 m, to the other over 2.9 m, and no more.
+        let slope = direction.xz().norm() / direction.y;
+        assert!((0.0..2.0 * 0.094 / 2.9).contains(&slope), "{direction}");
+        let local = frame.inverse();
+        let point = local.r_wc * Vector3::from(axis.point_m) + local.t_wc;
+        assert!(point.xz().norm() < 0.2, "{point}");
+        // In the frame of a tunnel they stay as they are, though their line is tilted.
+        assert_eq!(
+            found(revolving(&Pose::identity()), None, Some(3.0)).axis,
+            None
+        );
     }
 }

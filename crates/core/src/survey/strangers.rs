@@ -1,4 +1,4 @@
-//! Pictures among the frames that are none: of another size, or copies of others.
+//! Files among the frames that are none: no pictures, of another size, or copies of others.
 
 use crate::frames::FrameFile;
 use std::collections::BTreeMap;
@@ -6,8 +6,8 @@ use std::collections::btree_map::Entry;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
-/// Says which pictures are of another size than most, or copies of others, and that they are to be
-/// moved away; None if there are none.
+/// Says which files are no pictures, are of another size than most, or copies of others, and that
+/// they are to be moved away; None if there are none.
 pub(super) fn strangers_among(frames: &[FrameFile]) -> Option<String> {
     let mut said = Vec::new();
     let sizes = frames.par_map(|frame| frame.size().ok());
@@ -26,6 +26,16 @@ pub(super) fn strangers_among(frames: &[FrameFile]) -> Option<String> {
         said.push(format!(
             "{} of the frames are of another size than the others ({}: {width} × {height} px)",
             others.len(),
+            printed(frames[*first].path.as_ref())
+        ));
+    }
+    let unread: Vec<usize> = (0..frames.len()).filter(|k| sizes[*k].is_none()).collect();
+    if let Some(first) = unread.first()
+        && unread.len() < frames.len()
+    {
+        said.push(format!(
+            "{} of the frames are no pictures that can be read ({})",
+            unread.len(),
             printed(frames[*first].path.as_ref())
         ));
     }
@@ -103,5 +113,10 @@ mod tests {
         );
         assert!(said.contains("1_thumb.png: 4 × 4 px"), "{said}");
         assert!(said.contains("1 (1).png of 1.png"), "{said}");
+        let notes = dir.path().join("notes.txt");
+        std::fs::write(&notes, "lamp 2 off").unwrap();
+        let said = strangers_among(&frames(&[&all[..], &[notes]].concat())).unwrap();
+        assert!(said.contains("1 of the frames are no pictures"), "{said}");
+        assert!(said.contains("notes.txt"), "{said}");
     }
 }

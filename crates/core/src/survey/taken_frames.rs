@@ -3,7 +3,7 @@
 use super::camera_section::CameraSection;
 use super::error::SurveyError;
 use super::file::{FramesSection, SurveyFile};
-use super::frame_list::FrameList;
+use super::frame_list::{FrameList, bits_warning};
 use super::frame_skipping::skip_unreadable;
 use super::skipped_frame::SkippedFrame;
 use crate::frames::{FrameFile, FrameSet, Mask, Masks, Video};
@@ -32,7 +32,10 @@ pub(super) struct TakenFrames {
     pub times_s: Option<Vec<f64>>,
     /// The video that contains the frames, if any.
     pub video: Option<Arc<Video>>,
-    /// Warnings about the pictures' orientation.
+    /// Bits of the values in files of 16 bits, if these leave the upper ones empty and the survey
+    /// does not say so.
+    pub bits: Option<u8>,
+    /// Warnings about the pictures' orientation and bits.
     pub warnings: Vec<String>,
 }
 
@@ -101,6 +104,11 @@ impl SurveyPlace<'_> {
             Some(true) => skip_unreadable(listed, size)?,
             _ => (listed, Vec::new()),
         };
+        let bits = FrameList::used_bits(std::slice::from_ref(&listed), size, frames);
+        let listed = match bits {
+            Some(bits) => listed.with_bits(bits),
+            None => listed,
+        };
         Ok(TakenFrames {
             cameras: camera.into(),
             rig: None,
@@ -108,7 +116,8 @@ impl SurveyPlace<'_> {
             skipped,
             times_s: listed.times_s,
             video: listed.video,
-            warnings: warning.into_iter().collect(),
+            bits,
+            warnings: warning.into_iter().chain(bits.map(bits_warning)).collect(),
             frames: FrameSet::new(listed.frames, self.mask(frames, &camera)?),
         })
     }
@@ -140,6 +149,13 @@ impl SurveyPlace<'_> {
             mounts.push(Pose::new(camera_in_body.r_wc, t_m));
         }
         self.check_same(&cameras, &lists)?;
+        let cameras = Cameras::of_rig(cameras).ok_or(SurveyError::NoFrame)?;
+        let bits = FrameList::used_bits(&lists, cameras.size().into(), &self.file.frames);
+        if let Some(bits) = bits {
+            let read = lists.into_iter().map(|list| list.with_bits(bits));
+            lists = read.collect();
+            warnings.push(bits_warning(bits));
+        }
         let (rotation_sigma_rad, translation_sigma_m) = (self.file.rig.unwrap_or_default())
             .sigmas()
             .map_err(|what| self.value(what))?;
@@ -153,13 +169,14 @@ impl SurveyPlace<'_> {
         };
         let frames = (0..count * moments.len()).map(frame).collect();
         Ok(TakenFrames {
-            cameras: Cameras::of_rig(cameras).ok_or(SurveyError::NoFrame)?,
+            cameras,
             frames: FrameSet::new(frames, Masks::of_rig(masks)),
             rig: Rig::new(mounts, rotation_sigma_rad, translation_sigma_m),
             moments,
             skipped: Vec::new(),
             times_s,
             video: None,
+            bits,
             warnings,
         })
     }

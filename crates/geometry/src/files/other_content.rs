@@ -2,7 +2,7 @@
 //! beginning.
 
 /// Beginnings of files, and sentences that say what they are, with the remedy.
-const KINDS: [(&[u8], &str); 8] = [
+const KINDS: [(&[u8], &str); 10] = [
     (
         b"\x1f\x8b",
         "is packed by gzip, not text; unpack it (gunzip)",
@@ -21,6 +21,15 @@ const KINDS: [(&[u8], &str); 8] = [
     (
         b"MATLAB 5.0 MAT-file",
         "is a file of MATLAB; save the array as text (writematrix)",
+    ),
+    (
+        b"\x93NUMPY",
+        "is a NumPy array; save it as text: a = np.load(\"poses.npy\"); \
+         np.savetxt(\"poses.txt\", a.reshape(len(a), -1))",
+    ),
+    (
+        b"{\\rtf",
+        "is formatted text (RTF), as TextEdit and WordPad save it; save it as plain text",
     ),
     (LFS_POINTER, LFS_SENTENCE),
 ];
@@ -87,6 +96,8 @@ mod tests {
                 "git lfs pull",
             ),
             (b"PK\x03\x04\x14\0", "save the sheet as CSV"),
+            (b"\x93NUMPY\x01\0", "np.savetxt"),
+            (b"{\\rtf1\\ansi", "plain text"),
         ] {
             let kind = kind(content).unwrap();
             assert!(kind.contains(expected), "{kind}");

@@ -73,12 +73,22 @@ impl StraightPath {
         } else {
             principal
         };
+        let path = Self::along(centres, direction)?;
+        let is_long = along > (MIN_ELONGATION * path.rms_distance).powi(2);
+        is_long.then_some(path)
+    }
+
+    /// The line of a direction, a unit vector, through the mean of camera centres, however far they
+    /// are off it; None without centres.
+    pub fn along(centres: &[Vector3<f64>], direction: Vector3<f64>) -> Option<Self> {
+        let first = centres.first()?;
+        let count = centres.len() as f64;
+        let middle = centres.iter().sum::<Vector3<f64>>() / count;
         let line = Line { middle, direction };
         let distances: Vec<f64> = centres.iter().map(|c| line.distance(c)).collect();
         let mean_square = distances.iter().map(|d| d * d).sum::<f64>() / count;
         let stations = || centres.iter().map(|c| direction.dot(&(c - middle)));
-        let is_long = along > MIN_ELONGATION.powi(2) * mean_square;
-        is_long.then(|| Self {
+        Some(Self {
             start: middle + direction * direction.dot(&(first - middle)),
             direction,
             length: stations().fold(f64::NEG_INFINITY, f64::max)

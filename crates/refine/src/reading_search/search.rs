@@ -212,7 +212,8 @@ fn compare<'r>(
     }))
 }
 
-/// The readings found, the most probable first, without those that it is distinguished from.
+/// The readings found, the most probable first, without those that it is distinguished from; those
+/// that the pictures' files ask for before the others.
 fn name(mut found: Vec<Found>) -> Option<FittingReadings> {
     found.sort_by(|a, b| {
         let by_odds = b.log_odds.total_cmp(&a.log_odds);
@@ -220,12 +221,15 @@ fn name(mut found: Vec<Found>) -> Option<FittingReadings> {
     });
     let best = found.first()?;
     let named = found.iter().filter(|one| !one.is_distinguished_from(best));
+    let mut named: Vec<&Found> = named.collect();
+    named.sort_by_key(|one| !one.reading.is_stated);
+    let first = named.first()?;
     Some(FittingReadings {
-        readings: named.map(|one| one.reading.remedy.clone()).collect(),
-        fitting: best.fitting,
-        given: best.given,
-        pairs: best.pairs,
-        log_odds: best.log_odds,
+        readings: named.iter().map(|one| one.reading.remedy.clone()).collect(),
+        fitting: first.fitting,
+        given: first.given,
+        pairs: first.pairs,
+        log_odds: first.log_odds,
     })
 }
 
@@ -240,6 +244,7 @@ mod tests {
         PoseReading {
             remedy: format!("{prior_nats}"),
             changes: 1,
+            is_stated: false,
             prior_nats,
             initial: Vec::new(),
             orientation: PictureOrientation::Stored,

@@ -101,6 +101,7 @@ mod tests {
         PoseReading {
             remedy: String::new(),
             changes: 1,
+            is_stated: false,
             prior_nats: 0.0,
             initial: (0..=steps).map(stamped).collect(),
             orientation: PictureOrientation::Stored,

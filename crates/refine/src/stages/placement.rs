@@ -21,7 +21,7 @@ use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::uncertainty::shape_report::{EstimatedShape, ShapeReport};
 use crate::verdict::bridging::Bridging;
 use crate::verdict::length_scale::LengthScale;
-use crate::verdict::prior_test::PriorTest;
+use crate::verdict::prior_test::{GivenLengths, PriorTest};
 use crate::verdict::rig_report::MountReport;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use nalgebra::{Matrix6, Vector3};
@@ -100,10 +100,9 @@ impl Placement {
         let mut covariances = covariances.clone().moved(&motion).scaled(datum.scale);
         let poses: Vec<Pose> = estimates.iter().map(|estimate| estimate.pose).collect();
         let alpha = setup.options.false_alarm_rate;
-        let radius_m = setup.input.nominal_radius_m;
         let prior_test = PriorTest::new(
             prior,
-            (datum, radius_m),
+            (datum, given_lengths(setup)),
             &poses,
             &covariances,
             &placed,
@@ -207,9 +206,9 @@ impl Placement {
         let [photometric, uncertain] = [FrameFlag::Photometric, FrameFlag::Uncertain].map(sigmas);
         let placed_frames = photometric.len() + uncertain.len();
         let is_any_placed = placed_frames > 0;
-        let radius_m = setup.input.nominal_radius_m;
+        let lengths = given_lengths(setup);
         let scale = self.prior_test.contradicting_scale();
-        let contradiction = scale.map(|scale| scale.explain(radius_m));
+        let contradiction = scale.map(|scale| scale.explain(lengths));
         let verdict = SurveyVerdict::new(
             (&photometric, &uncertain),
             parts.frames.len(),
@@ -218,7 +217,7 @@ impl Placement {
             contradiction.as_deref(),
         );
         let points = setup.wall.as_ref().map(|wall| wall.report.clone());
-        let radius = (radius_m, setup.input.radius_sigma);
+        let radius = (lengths.radius_m, setup.input.radius_sigma);
         let length_scale = LengthScale::new(radius, parts.calibration.as_ref(), points.as_ref());
         let (by, scale) = self.wall_motion;
         let masked = parts.masked.filter(|_| is_any_placed);
@@ -312,4 +311,12 @@ fn aligned(estimates: &[FrameEstimate], motion: &GaugeMotion) -> Vec<FrameEstima
         ..*estimate
     });
     aligned.collect()
+}
+
+/// The lengths of a survey.
+fn given_lengths(setup: &Setup) -> GivenLengths {
+    GivenLengths {
+        radius_m: setup.input.nominal_radius_m,
+        unscaled_unit_m: setup.input.unscaled_unit_m,
+    }
 }

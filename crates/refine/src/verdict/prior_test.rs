@@ -58,6 +58,16 @@ pub struct PriorTest {
     pub findings: Vec<String>,
 }
 
+/// Lengths of a survey, as given.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct GivenLengths {
+    /// Radius of the tunnel, metres.
+    pub radius_m: f64,
+    /// Length of a unit of the initial poses, metres, if they have no scale of their own.
+    pub unscaled_unit_m: Option<f64>,
+}
+
 /// Refined steps over initial ones.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -94,10 +104,10 @@ struct PriorError {
 
 impl PriorTest {
     /// Tests the prior on the frames that are placed. `estimates` and `covariances` are aligned
-    /// with the initial poses along the gauge; `radius_m`: as given; `alpha`: rate of false alarms.
+    /// with the initial poses along the gauge; `alpha`: rate of false alarms.
     pub fn new(
         prior: &Prior,
-        (datum, radius_m): (&Datum, f64),
+        (datum, lengths): (&Datum, GivenLengths),
         poses: &[Pose],
         covariances: &Covariances,
         placed: &[bool],
@@ -112,7 +122,7 @@ impl PriorTest {
             other_model: runs_contradict(&errors, expects_walk, alpha),
             findings: Vec::new(),
         };
-        test.findings = test.explain(radius_m, prior.jitter.model);
+        test.findings = test.explain(lengths, prior.jitter.model);
         test
     }
 
@@ -122,10 +132,10 @@ impl PriorTest {
     }
 
     /// The contradictions in sentences.
-    fn explain(&self, radius_m: f64, model: JitterModel) -> Vec<String> {
+    fn explain(&self, lengths: GivenLengths, model: JitterModel) -> Vec<String> {
         let mut findings = Vec::new();
         if let Some(scale) = self.contradicting_scale() {
-            findings.push(scale.explain(radius_m));
+            findings.push(scale.explain(lengths));
         }
         for sigma in &self.sigmas {
             findings.push(format!(
@@ -163,12 +173,25 @@ const MIN_FACTOR_SIGMAS: f64 = 3.0;
 
 impl ScaleTest {
     /// The contradiction, and the slip that has its factor.
-    pub fn explain(&self, radius_m: f64) -> String {
+    pub fn explain(&self, lengths: GivenLengths) -> String {
         let Self { factor, sigma, .. } = self;
+        let GivenLengths {
+            radius_m,
+            unscaled_unit_m,
+        } = lengths;
         if *factor < MIN_FACTOR_SIGMAS * sigma {
             return format!(
                 "refined steps do not follow the initial ones: they are {factor:.2} ± {sigma:.2} \
                  times as long in the same direction"
+            );
+        }
+        if let Some(unit_m) = unscaled_unit_m {
+            let unit_m = unit_m * factor;
+            return format!(
+                "refined steps are {factor:.2} ± {sigma:.2} times the initial ones, which have no \
+                 scale of their own: if radius_m is right, a unit of the poses is about \
+                 {unit_m:.4} m (tunnelstitch init --force --radius-m {radius_m} --unit-m \
+                 {unit_m:.4} writes it, with the axis)"
             );
         }
         let is_near = |value: f64| (factor / value).ln().abs() < 3.0 * sigma / factor + 0.05;
@@ -401,7 +424,13 @@ mod tests {
         let datum = calibration.datum(&Kappa::zeros());
         PriorTest::new(
             prior,
-            (&datum, 6.0),
+            (
+                &datum,
+                GivenLengths {
+                    radius_m: 6.0,
+                    unscaled_unit_m: None,
+                },
+            ),
             poses,
             &covariances,
             &[true; COUNT],
@@ -428,6 +457,15 @@ mod tests {
         let text = found.findings.join("\n");
         assert!(
             text.contains("radius_m is about") && text.contains("diameter"),
+            "{text}"
+        );
+        // Poses without a scale of their own say nothing of the radius.
+        let text = found.scale.unwrap().explain(GivenLengths {
+            radius_m: 6.0,
+            unscaled_unit_m: Some(0.5),
+        });
+        assert!(
+            text.contains("--radius-m 6 --unit-m") && !text.contains("diameter"),
             "{text}"
         );
     }

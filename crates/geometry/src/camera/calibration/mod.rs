@@ -1,16 +1,17 @@
 //! Calibration files: the program's own format (JSON or TOML), OpenCV's YAML, ROS's camera_info,
-//! Kalibr's camchain, the YAML of camodocal and VINS-Fusion, COLMAP's cameras.txt and cameras.bin,
-//! nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, Meshroom, Metashape, Bundler,
-//! RealityCapture and Pix4D, Basalt's JSON, Gyroflow's lens profiles and OCamCalib's
+//! Kalibr's camchain, the YAML of camodocal, VINS-Fusion and ORB-SLAM, COLMAP's cameras.txt and
+//! cameras.bin, nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, Meshroom, Metashape,
+//! Bundler, RealityCapture and Pix4D, Basalt's JSON, Gyroflow's lens profiles and OCamCalib's
 //! calib_results.txt.
 //!
 //! | file | recognised by | lens | centre of the first pixel |
 //! | --- | --- | --- | --- |
 //! | own | `.json`, `.toml` | [`native`] | `pixel_centre` |
-//! | OpenCV | `.yaml`, `.yml`; a matrix with `rows`, `cols`, `data` named `camera_matrix` or similar | 4, 5 or 8 coefficients; fisheye if `fisheye_model: 1` | (0, 0) |
+//! | OpenCV | `.yaml`, `.yml`, `.json`; a matrix (`rows`, `cols`, `data`, or rows) named `camera_matrix` or similar; size from the pictures if it has none | 4, 5 or 8 coefficients; fisheye if `fisheye_model: 1` | (0, 0) |
 //! | ROS | as OpenCV, with `distortion_model` | `plumb_bob`, `rational_polynomial`, `equidistant` | (0, 0) |
 //! | Kalibr | `.yaml` with `cam0:` | pinhole with `radtan`, `equidistant`, `fov`, `none`; `omni` with `radtan`, `none`; `ds`; `eucm` | (0, 0) |
 //! | camodocal | `.yaml` with `model_type` | `PINHOLE`, `MEI`, `KANNALA_BRANDT` | (0, 0) |
+//! | ORB-SLAM2, ORB-SLAM3 | `.yaml` with `Camera.fx` or `Camera1.fx` | `PinHole`, `KannalaBrandt8`, `Rectified` | (0, 0) |
 //! | COLMAP | `.txt`, `.bin` | PINHOLE … FULL_OPENCV, the fisheyes, THIN_PRISM_FISHEYE, FOV, EUCM | (½, ½) |
 //! | OCamCalib | `.txt` with five lines of numbers | polynomial | (0, 0) |
 //! | OpenSfM | `.json` that is a list with `cameras` | `perspective`, `simple_radial`, `radial`, `brown`, `fisheye`, `fisheye_opencv` | normalised |
@@ -45,6 +46,7 @@ mod ocamcalib;
 mod opencv;
 mod openmvg;
 mod opensfm;
+mod orbslam;
 mod per_picture;
 mod picture_size;
 mod pix4d;

@@ -5,8 +5,8 @@ use super::picture_size::PictureSize;
 use super::unknown::unknown_calibration;
 use super::{
     basalt, bundler, camodocal, colmap, colmap_binary, gyroflow, kalibr, meshroom, metashape,
-    native, nerfstudio, ocamcalib, opencv, openmvg, opensfm, pix4d, realitycapture, recorded,
-    value_tree,
+    native, nerfstudio, ocamcalib, opencv, openmvg, opensfm, orbslam, pix4d, realitycapture,
+    recorded, value_tree,
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
@@ -36,7 +36,7 @@ pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, Calib
 
 /// Reads a calibration file as [`read_calibration`] does; `picture_size` gives width and height of
 /// the pictures, pixels, and is asked only for files that do not state them (Bundler,
-/// RealityCapture, Pix4D's `.cam`).
+/// RealityCapture, Pix4D's `.cam`, some of OpenCV and ORB-SLAM).
 ///
 /// # Errors
 /// Those of [`read_calibration`]; a size that is needed and not known.
@@ -104,8 +104,10 @@ fn parse(
                 kalibr::read(&tree, name)
             } else if camodocal::is_camodocal(&tree) {
                 camodocal::read(&tree)
+            } else if orbslam::is_settings(&tree) {
+                orbslam::read(&tree, name, size)
             } else {
-                opencv::read(&tree)
+                opencv::read(&tree, size)
             }
         }
         "txt" if pix4d::is_picture_list(text) => pix4d::read_pictures(text, name),
@@ -132,6 +134,7 @@ fn parse(
             Ok(tree) if openmvg::is_sfm_data(&tree) => openmvg::read(&tree, name),
             Ok(tree) if meshroom::is_sfm(&tree) => meshroom::read(&tree, name),
             Ok(tree) if basalt::is_basalt(&tree) => basalt::read(&tree, name),
+            Ok(tree) if opencv::has_matrix(&tree) => opencv::read(&tree, size),
             Ok(tree) if !native::is_native(&tree) => Err(unknown_calibration("")),
             _ => native::read_json(text),
         },

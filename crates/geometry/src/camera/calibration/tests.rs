@@ -351,3 +351,36 @@ fn bad_files_say_where_and_what() {
     let message = read_calibration(&path, None).unwrap_err().to_string();
     assert!(message.contains("no text of UTF-8"), "{message}");
 }
+
+/// Scripts of OpenCV dump JSON, or YAML without a size.
+#[test]
+fn camera_matrices_without_a_size_have_that_of_the_pictures() {
+    let matrix = "[[500.0, 0, 310.0], [0, 501.0, 230.0], [0, 0, 1]]";
+    for (name, text) in [
+        (
+            "a.json",
+            format!("{{\"mtx\": {matrix}, \"dist\": [[-0.2, 0.03, 0, 0, 0]]}}"),
+        ),
+        (
+            "b.json",
+            format!("{{\"camera_matrix\": {matrix}, \"dist_coeff\": [-0.2, 0.03, 0, 0]}}"),
+        ),
+        (
+            "c.yaml",
+            format!("camera_matrix: {matrix}\ndist_coeff: [[-0.2, 0.03, 0, 0, 0]]\n"),
+        ),
+    ] {
+        let camera = read_sized(name, &text, None, Some([640, 480])).unwrap();
+        assert_eq!([camera.width, camera.height], [640, 480]);
+        assert_eq!(
+            [camera.fx, camera.fy, camera.cx, camera.cy],
+            [500.0, 501.0, 310.0, 230.0]
+        );
+        assert_eq!(
+            camera.lens,
+            brown([-0.2, 0.03, 0.0, 0.0, 0.0, 0.0], [0.0; 2])
+        );
+        let said = read_as(name, &text).unwrap_err().to_string();
+        assert!(said.contains("add the frames' size"), "{said}");
+    }
+}

@@ -4,11 +4,11 @@ use super::error::{ParseError, ParseErrorKind};
 
 /// The files that can be read.
 const KNOWN: &str = "known are camera.json and camera.toml of this program, YAML of OpenCV, ROS \
-                     (camera_info), Kalibr (camchain) and camodocal, COLMAP's cameras.txt and \
-                     cameras.bin, nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, \
-                     Meshroom, Metashape, Bundler, RealityCapture and Pix4D, Basalt's JSON, \
-                     Gyroflow's lens profiles and OCamCalib's calib_results.txt; or write a \
-                     camera.json";
+                     (camera_info), Kalibr (camchain), camodocal and ORB-SLAM, JSON of OpenCV, \
+                     COLMAP's cameras.txt and cameras.bin, nerfstudio's transforms.json, the files \
+                     of OpenSfM, OpenMVG, Meshroom, Metashape, Bundler, RealityCapture and Pix4D, \
+                     Basalt's JSON, Gyroflow's lens profiles and OCamCalib's calib_results.txt; or \
+                     write a camera.json";
 
 /// The error that names the known files; `missing`: an explanation in brackets, or nothing.
 pub fn unknown_calibration(missing: &str) -> ParseError {
