@@ -188,7 +188,8 @@ pub struct FunctionValue {
 }
 
 impl ShapeModel {
-    /// Harmonics and lattices of 8, 16, … up to `finest` columns, all of the strength `sigma_m`, for the wall between two chainages, metres; `origin`: node of the lattices.
+    /// Harmonics and lattices of 8, 16, … up to `finest` columns, all of the strength `sigma_m`,
+    /// for the wall between two chainages, metres; `origin`: node of the lattices.
     pub fn new(
         perimeter_m: f64,
         origin: WallPoint,
