@@ -486,11 +486,19 @@ mod tests {
         for block in &mut truth[ranges[3].clone()] {
             *block = ShapeStep::from_fn(|_, _| 0.005 * normal_number());
         }
-        for (k, c) in truth.iter().enumerate() {
+        let mut of_functions = vec![ShapeStep::repeat(1.0); blocks];
+        for (scale, range) in model.scales.iter().zip(&ranges) {
+            if let Functions::Harmonics { .. } = scale.functions {
+                let of_scale = &mut of_functions[range.clone()];
+                scale.functions.retain_deformation(of_scale);
+            }
+        }
+        for (k, (c, of_functions)) in truth.iter().zip(&of_functions).enumerate() {
             let observed = c + ShapeStep::from_fn(|_, _| 0.001 * normal_number());
-            let information = Block::identity() * (1e6 + 1e4);
+            let pixels = of_functions * 1e6;
+            let information = Block::identity() * 1e4 + Block::from_diagonal(&pixels);
             normal.add_block(&pattern, 1 + k, 1 + k, &information);
-            normal.gradient[1 + k] = observed * -1e6;
+            normal.gradient[1 + k] = -observed.component_mul(&pixels);
         }
         let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
         let equations = ShapeEquations {
@@ -507,7 +515,7 @@ mod tests {
         let dropped = learned.dropped_scales(0.03, 1e-3);
         assert!(!dropped.is_empty());
         for DroppedScale { limit, .. } in &dropped {
-            let n = 8.0 * limit.functions.blocks() as f64;
+            let n = limit.functions.deformations() as f64;
             let expected_m = 1e-3 * (4.0 * 4.77 / n).powf(0.25);
             assert!(
                 (0.5..2.5).contains(&(limit.sigma_m / expected_m)),
