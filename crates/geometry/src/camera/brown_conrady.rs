@@ -1,7 +1,7 @@
 //! The Brown–Conrady lens model.
 
-use super::monotone::invert_monotone;
 use super::planar_inverse::{invert_planar, planar_limit};
+use crate::numerics::monotone::invert_monotone;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::FRAC_PI_2;
 

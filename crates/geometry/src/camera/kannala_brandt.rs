@@ -1,8 +1,8 @@
 //! The Kannala–Brandt fisheye model.
 
 use super::field_of_view::FieldOfView;
-use super::monotone::{invert_monotone, monotone_limit};
 use super::radial::{is_on_axis, project_radial, radial_jacobian, radial_ray};
+use crate::numerics::monotone::{invert_monotone, monotone_limit};
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use std::f64::consts::PI;
 

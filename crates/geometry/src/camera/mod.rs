@@ -32,7 +32,6 @@ mod lens_slip;
 #[cfg(test)]
 mod lens_tests;
 mod mei;
-mod monotone;
 mod ocam;
 mod planar_inverse;
 mod projection;

@@ -2,8 +2,8 @@
 
 use super::field_of_view::FieldOfView;
 use super::lens_error::LensParameterError;
-use super::monotone::{invert_monotone, monotone_limit};
 use super::radial::{project_radial, radial_jacobian, radial_ray};
+use crate::numerics::monotone::{invert_monotone, monotone_limit};
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use std::f64::consts::PI;
 

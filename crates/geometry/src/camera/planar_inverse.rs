@@ -1,7 +1,7 @@
 //! Maps of the plane that keep its orientation near the origin: the circle within which they do,
 //! and their inverse.
 
-use super::monotone::monotone_limit;
+use crate::numerics::monotone::monotone_limit;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::TAU;
 

@@ -2,9 +2,9 @@
 
 use super::field_of_view::FieldOfView;
 use super::lens_error::LensParameterError;
-use super::monotone::invert_monotone;
 use super::planar_inverse::{invert_planar, planar_limit};
 use super::radial::{project_radial, radial_jacobian, radial_ray};
+use crate::numerics::monotone::invert_monotone;
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use std::f64::consts::PI;
 

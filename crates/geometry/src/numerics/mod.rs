@@ -1,9 +1,10 @@
-//! General numerical tools: medians, window functions, Fourier transforms of rasters, and loops
-//! compiled for the processor at hand.
+//! General numerical tools: medians, inverses, window functions, Fourier transforms of rasters, and
+//! loops compiled for the processor at hand.
 //!
 //! | tool | file |
 //! | --- | --- |
 //! | median of values of which some may be unknown | [`median`] |
+//! | where a function rises, and its inverse there | [`monotone`] |
 //! | weights of the pixels around a point | [`kernel`] |
 //! | a function of every element, on all threads | [`parallel`] |
 //! | rounding of small numbers without casts | [`rounding`] |
@@ -13,6 +14,7 @@
 
 pub mod kernel;
 pub mod median;
+pub mod monotone;
 pub mod parallel;
 pub mod rounding;
 pub mod signal;

@@ -12,6 +12,7 @@
 pub mod calibration;
 pub mod frame_estimate;
 pub mod shape;
+pub mod shape_functions;
 pub mod shape_limits;
 pub mod unknowns;
 pub mod unseen_errors;

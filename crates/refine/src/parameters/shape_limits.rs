@@ -1,6 +1,7 @@
 //! Limits of the wall's shape: of bend, coefficients, strengths and lattices.
 
-use crate::parameters::shape::{Shape, ShapeStep};
+use crate::parameters::shape::Shape;
+use crate::parameters::shape_functions::ShapeStep;
 
 /// Radius of the bend that a tunnel may have which is planned straight, 1-σ of the curvature, in
 /// multiples of its own radius: 90 m for one of 3 m.

@@ -2,7 +2,7 @@
 
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
-use crate::parameters::shape::ShapeStep;
+use crate::parameters::shape_functions::ShapeStep;
 use serde::{Deserialize, Serialize};
 
 /// The unknowns of a solve: the active frames, the parameters that all frames share, and the shape

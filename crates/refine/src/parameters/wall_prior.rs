@@ -1,6 +1,7 @@
 //! Prior of a wall whose deformation is a known random field.
 
-use crate::parameters::shape::{OVALITY, ShapeModel};
+use crate::parameters::shape::ShapeModel;
+use crate::parameters::shape_functions::OVALITY;
 use tunnelstitch_geometry::surface::WallPoint;
 
 /// Distance of the nodes of a lattice over the length ℓ of a field with the correlation

@@ -10,7 +10,8 @@
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::sparse_cholesky::SymbolicFactorisation;
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
-use crate::parameters::shape::{Shape, ShapeModel, ShapeStep};
+use crate::parameters::shape::{Shape, ShapeModel};
+use crate::parameters::shape_functions::ShapeStep;
 use crate::parameters::shape_limits::with_finer_lattice;
 use crate::point_fit::located_points::LocatedPoint;
 use crate::point_fit::robust::{Weighting, huber_weight, robust_sigma_m, tukey_weight};

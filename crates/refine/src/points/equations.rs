@@ -13,7 +13,8 @@
 
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
-use crate::parameters::shape::{FunctionValue, ShapeModel, ShapeStep};
+use crate::parameters::shape::{FunctionValue, ShapeModel};
+use crate::parameters::shape_functions::ShapeStep;
 use crate::points::observations::{PointObservation, PointObservations};
 use nalgebra::SMatrix;
 use rand_chacha::ChaCha8Rng;

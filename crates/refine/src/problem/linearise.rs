@@ -5,7 +5,7 @@ use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::RADIUS_INDEX;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::parameters::shape::ShapeStep;
+use crate::parameters::shape_functions::ShapeStep;
 use crate::parameters::unknowns::Unknowns;
 use crate::points::equations::PointEquations;
 use crate::problem::block_sums::BlockSums;

@@ -5,7 +5,8 @@
 //! stretch has kept, with the root mean square of its strengths, and coefficients where the fields
 //! of the stretches are. The last solve learns the strengths anew.
 
-use crate::parameters::shape::{Functions, Scale, Shape, ShapeModel, ShapeStep};
+use crate::parameters::shape::{Scale, Shape, ShapeModel};
+use crate::parameters::shape_functions::{Functions, ShapeStep};
 use tunnelstitch_geometry::surface::{RadialField, SplineLattice, WallPoint};
 
 /// Points around the tunnel by which harmonics are found, so many that those of the highest order
@@ -191,7 +192,7 @@ fn lattice(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::shape::OVALITY;
+    use crate::parameters::shape_functions::OVALITY;
     use std::f64::consts::TAU;
 
     const PERIMETER_M: f64 = 3.0 * TAU;

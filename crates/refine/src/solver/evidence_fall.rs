@@ -16,6 +16,8 @@
 //!
 //! as much as a strength lowers it if n is large, and sooner if it is not ([`seen_size`]).
 
+use tunnelstitch_geometry::numerics::monotone::invert_monotone;
+
 /// Step of the strength's logarithm that is taken without another evaluation.
 const NARROW: f64 = 0.17;
 /// Evaluations at the most.
@@ -24,29 +26,19 @@ const MAX_EVALUATIONS: usize = 8;
 const POWERS: std::ops::RangeInclusive<f64> = 0.5..=4.0;
 /// Share of the interval that a new point keeps from its ends.
 const MARGIN: f64 = 0.1;
-/// Mean squares of coefficients over those of their errors, from and to.
-const ROOTS: [f64; 2] = [1e-9, 1e9];
-/// Halvings of the logarithms between them.
-const BISECTIONS: usize = 40;
 
 /// Size of n coefficients that raise L by `change`, over the strength that lowers it by as much.
 pub fn seen_size(n: f64, change: f64) -> f64 {
-    let x = root(|x| 0.5 * n * (x - x.ln_1p()) - change);
-    let q = root(|q| 0.5 * n * (q.ln_1p() - q / (1.0 + q)) - change);
-    (x / q).sqrt()
-}
-
-/// The root of a rising function within [`ROOTS`].
-fn root(function: impl Fn(f64) -> f64) -> f64 {
-    let [mut low, mut high] = ROOTS.map(f64::ln);
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (low + high);
-        match function(middle.exp()) < 0.0 {
-            true => low = middle,
-            false => high = middle,
-        }
-    }
-    high.exp()
+    // Functions with their slopes.
+    let raised = |x: f64| (0.5 * n * (x - x.ln_1p()), 0.5 * n * x / (1.0 + x));
+    let lowered = |q: f64| {
+        let change = 0.5 * n * (q.ln_1p() - q / (1.0 + q));
+        (change, 0.5 * n * q / (1.0 + q).powi(2))
+    };
+    let x = invert_monotone(raised, change, f64::INFINITY);
+    let q = invert_monotone(lowered, change, f64::INFINITY);
+    // Of so many coefficients that both are lost in rounding, both are the same.
+    x.zip(q).map_or(1.0, |(x, q)| (x / q).sqrt())
 }
 
 /// Values of the fall that are known.

@@ -7,7 +7,8 @@ use crate::parameters::calibration::{
     BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa, SHARED_PARAMETERS,
 };
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::parameters::shape::{Shape, ShapeModel, ShapeStep};
+use crate::parameters::shape::{Shape, ShapeModel};
+use crate::parameters::shape_functions::ShapeStep;
 use crate::parameters::shape_limits::{
     FIRST_FINEST_COLUMNS, MAX_PRIOR_SIGMAS, MAX_STRENGTH_SIGMAS, with_finer_lattice,
 };

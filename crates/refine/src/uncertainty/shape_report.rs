@@ -1,7 +1,8 @@
 //! The wall's shape of the result, with its uncertainty.
 
 use crate::model::context::{EstimationContext, total_displacement};
-use crate::parameters::shape::{Functions, Scale, Shape, ShapeModel};
+use crate::parameters::shape::{Scale, Shape, ShapeModel};
+use crate::parameters::shape_functions::Functions;
 use crate::uncertainty::pixel_jacobians::PointJacobians;
 use crate::uncertainty::total_covariance::TotalCovariance;
 use nalgebra::Vector2;
