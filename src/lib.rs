@@ -74,7 +74,7 @@
 //! | `crates` | `geometry` < `core` < `photometry`, `super_resolve` < `refine`, `render`, `simulate` < `evaluate` < `src` |
 //! | `crates/geometry` | `files`, `numerics` < `recordings` < `camera` < `trajectory` < `surface` |
 //! | `crates/core` | `bitmap_text`, `colour_map`, `persist`, `points`, `progress` < `raster`, `frames`, `storage` < `survey`, `test_wall` |
-//! | `crates/refine` | `thresholds`, `options` < `parameters` < `linear` < `points` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `point_fit` < `comparison` < `tracking` < `validation` < `uncertainty` < `verdict` < `report` < `refined` < `stages` < `pipeline` < `deformation_bound`, `live_tracking`, `reading_search`, `shards` |
+//! | `crates/refine` | `thresholds`, `options` < `parameters` < `linear` < `points` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `point_fit` < `comparison` < `tracking` < `validation` < `uncertainty` < `verdict` < `report` < `refined` < `stages` < `reading_search` < `pipeline` < `deformation_bound`, `live_tracking`, `shards` |
 //! | `crates/render` | `error` < `layout` < `warp` < `sampling` < `compositing` < `output` |
 //! | `src` | `check`, `follow` < `report`, `inspect` < `jobs` < `network_map` < `cli` |
 //!

@@ -1,6 +1,6 @@
 //! Messages propose what was tried and helps; where nothing does, they state what was found.
 
-use crate::support::{edit, fail, simulate, succeed, text, tunnelstitch};
+use crate::support::{edit, fail, json, simulate, succeed, text, tunnelstitch};
 use std::path::Path;
 
 /// Multiplies the positions of a file of poses.
@@ -53,6 +53,38 @@ fn where_no_reading_fits_none_is_proposed() {
     for guess in ["possible", "radius_m", "--pose-convention", "check "] {
         assert!(!message.contains(guess), "{guess}: {message}");
     }
+}
+
+/// Quaternions that begin with w: what fits is named before anything is solved as it is read.
+#[test]
+fn a_survey_that_is_read_wrongly_is_not_refined() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("survey");
+    simulate(&survey, &["--frames", "20", "--size", "160x120"]);
+    let poses = survey.join("baseline.tum");
+    let read = std::fs::read_to_string(&poses).unwrap();
+    let rows = read.lines().map(|line| {
+        let words: Vec<&str> = line.split(' ').collect();
+        [&words[..4], &words[7..], &words[4..7]].concat().join(" ") + "\n"
+    });
+    std::fs::write(&poses, rows.collect::<String>()).unwrap();
+    let out = dir.path().join("out");
+    let message = fail(&["refine", text(&survey), "--out", text(&out)], 4);
+    assert!(message.contains("quaternion = \"wxyz\""), "{message}");
+    let report = json(&out.join("refine.json"));
+    let named = report["readings"]["fit"]["readings"].to_string();
+    assert!(named.contains("wxyz"), "{named}");
+    assert_eq!(report["levels"].as_array().unwrap().len(), 0, "{message}");
+    // The remedy is one.
+    edit(
+        &survey.join("survey.toml"),
+        "[poses]",
+        "[poses]\nquaternion = \"wxyz\"",
+    );
+    succeed(&["refine", text(&survey), "--out", text(&out)]);
+    let report = json(&out.join("refine.json"));
+    assert_eq!(report["verdict"]["photometric"], 20);
+    assert!(report.get("readings").is_none(), "{report}");
 }
 
 /// A dozen frames of faint concrete, where a tilt of the camera moves the picture almost as a step

@@ -2,6 +2,7 @@
 
 use crate::model::problem_error::ProblemError;
 use crate::points::error::PointsFitError;
+use tunnelstitch_core::survey::SurveyError;
 
 /// A reason why frames cannot be refined.
 #[derive(Debug, thiserror::Error)]
@@ -115,6 +116,9 @@ pub enum RefineError {
     /// Measured points that do not fit the wall.
     #[error(transparent)]
     Points(#[from] PointsFitError),
+    /// Poses that cannot be read in all readings.
+    #[error(transparent)]
+    Readings(#[from] Box<SurveyError>),
     /// The equations.
     #[error(transparent)]
     Problem(#[from] ProblemError),

@@ -53,6 +53,9 @@ pub struct RefineInput<'a> {
     /// True if the initial poses are those in the tunnel as built: a bend that points show does not
     /// carry them along.
     pub as_built: bool,
+    /// The survey that it is, if it is one: where many frames fit nowhere, neighbours are compared
+    /// in its other readings.
+    pub survey: Option<&'a Survey>,
     /// Measured points of the wall. A [`Survey`] names their file; [`WallPoints::of_survey`] reads
     /// it.
     pub points: Option<&'a WallPoints>,
@@ -90,6 +93,7 @@ impl<'a> RefineInput<'a> {
             ignored: &NOTHING,
             calibrate: CalibrateSection::default(),
             as_built: false,
+            survey: None,
             points: None,
         }
     }
@@ -115,6 +119,7 @@ impl<'a> From<&'a Survey> for RefineInput<'a> {
             calibrate: survey.file.calibrate.clone().unwrap_or_default(),
             nominal_radius_m: survey.file.tunnel.nominal_m(),
             as_built: survey.file.poses.as_built == Some(true),
+            survey: Some(survey),
             points: None,
         }
     }

@@ -96,9 +96,7 @@ pub use point_fit::points_report::{PointsAxis, PointsReport, PointsSection};
 pub use points::error::PointsFitError;
 pub use points::wall_points::WallPoints;
 pub use problem::unknown_texture::UnknownTexture;
-pub use reading_search::{
-    FittingReadings, ReadingSearchError, can_search_readings, search_readings,
-};
+pub use reading_search::search_readings;
 pub use refined::Refined;
 pub use report::{
     FrameFlag, FrameReport, HiddenBand, LevelReport, PoseReport, RefineReport, StageTime,
@@ -120,6 +118,7 @@ pub use uncertainty::model_error::ModelErrorReport;
 pub use uncertainty::rolling_shutter_test::ReadoutEstimate;
 pub use uncertainty::shape_report::{EstimatedShape, ScaleReport, ShapeReport, UnseenScaleReport};
 pub use verdict::length_scale::{LengthScale, RadiusSource};
+pub use verdict::other_readings::{FittingReadings, OtherReadings};
 pub use verdict::prior_test::{GivenLengths, PriorTest, ScaleTest, SigmaTest};
 pub use verdict::rig_report::MountReport;
 pub use verdict::survey_verdict::SurveyVerdict;

@@ -2,15 +2,18 @@
 //!
 //! It begins again where a stage shows that what all of them rest on does not hold: with local
 //! normalisation where no model of the light fits, and without the bands along the tunnel that are
-//! hidden ([`crate::samples::hidden_bands`]).
+//! hidden ([`crate::samples::hidden_bands`]). It ends early where frames that fit nowhere show that
+//! poses, pictures or camera are read wrongly ([`crate::reading_search`]).
 
 use crate::error::RefineError;
 use crate::input::RefineInput;
-use crate::model::frame_states::majority;
+use crate::model::frame_states::{FrameStates, majority};
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
 use crate::options::{Photometry, RefineOptions};
+use crate::reading_search::search_readings;
 use crate::refined::Refined;
+use crate::report::FrameFlag;
 use crate::stages::assess::without_solution;
 use crate::stages::begin::begin;
 use crate::stages::plan::Stage;
@@ -18,6 +21,7 @@ use crate::stages::run::run_stage;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::{Estimation, PipelineState, Snapshot};
+use crate::verdict::other_readings::OtherReadings;
 use std::sync::Arc;
 use tunnelstitch_core::frames::Light;
 use tunnelstitch_core::persist::checkpoint::Checkpoint;
@@ -154,6 +158,7 @@ fn run_stages(
     if setup.options.photometry == Photometry::Normalised {
         setup.frames.set_light(Light::Normalised);
     }
+    let mut readings = state.readings.clone();
     let mut estimation = Estimation::new(state);
     while let Some(stage) = estimation.state.stages.front().copied() {
         if is_beyond(&stage) {
@@ -171,7 +176,21 @@ fn run_stages(
             Err(error) => return Err(error),
         };
         let fits = ended.as_ref().is_some_and(fits_light);
+        let has_strays = ended.as_ref().is_none_or(has_many_strays);
+        if readings.are_untried() && (has_strays || !fits) {
+            readings = compare_readings(setup, session)?;
+        }
+        let is_misread = matches!(readings, OtherReadings::Fit(_));
         estimation = match ended {
+            ended if is_misread && !ended.as_ref().is_some_and(is_assessed) => {
+                let frames = ended.map(|ended| ended.state.frames);
+                return unsolved(
+                    setup,
+                    session,
+                    (&RejectionReason::Misread, frames),
+                    readings,
+                );
+            }
             _ if !fits && may_normalise(setup) => {
                 let light = setup.frames.camera_light();
                 setup.frames.set_light(Light::Normalised);
@@ -186,24 +205,21 @@ fn run_stages(
             }) => return Ok(Outcome::Hidden(bands)),
             Some(ended) => match majority(&ended.state.frames.rejections) {
                 // No later stage registers frames on a minority.
-                Err(reason) if ended.refined.is_none() => {
-                    let rejections = ended.state.frames.rejections;
-                    return Ok(unsolved(setup, session, &reason, rejections));
+                Err(reason) if !is_assessed(&ended) => {
+                    let frames = Some(ended.state.frames);
+                    return unsolved(setup, session, (&reason, frames), readings);
                 }
                 _ => ended.without_first_stage(),
             },
             None => {
-                let rejections = vec![None; setup.count()];
-                return Ok(unsolved(
-                    setup,
-                    session,
-                    &RejectionReason::Unsolved,
-                    rejections,
-                ));
+                let reason = RejectionReason::Unsolved;
+                return unsolved(setup, session, (&reason, None), readings);
             }
         };
+        estimation.state.readings = readings.clone();
     }
-    let refined = estimation.refined.ok_or(RefineError::NoOverlap)?;
+    let mut refined = estimation.refined.ok_or(RefineError::NoOverlap)?;
+    refined.report.readings = readings;
     Ok(Outcome::refined(refined))
 }
 
@@ -211,6 +227,35 @@ impl Outcome {
     fn refined(refined: Refined) -> Self {
         Self::Paused(Pause::Refined(Box::new(refined)))
     }
+}
+
+/// True after the last stage.
+fn is_assessed(ended: &Estimation) -> bool {
+    ended.refined.is_some()
+}
+
+/// True if more than a quarter of the frames fit nowhere, or not the others: by so many pairs of
+/// neighbours at most is another reading of the survey contradicted that is right.
+fn has_many_strays(ended: &Estimation) -> bool {
+    let rejections = &ended.state.frames.rejections;
+    let strays = match &ended.refined {
+        Some(refined) => refined.report.count_flagged(FrameFlag::Prior),
+        None => (rejections.iter().flatten())
+            .filter(|reason| reason.is_stray())
+            .count(),
+    };
+    4 * strays > rejections.len()
+}
+
+/// Compares the readings of the survey, if the input is one.
+fn compare_readings(setup: &Setup, session: &Session) -> Result<OtherReadings, RefineError> {
+    let Some(survey) = setup.input.survey else {
+        return Ok(OtherReadings::Untried);
+    };
+    session.progress.start("readings", 1);
+    let found = search_readings(survey)?;
+    session.progress.finish();
+    Ok(found.into())
 }
 
 /// True if local normalisation may take the place of a model of light that does not hold.
@@ -231,12 +276,16 @@ fn fits_light(ended: &Estimation) -> bool {
     ended.state.has_common_light && (ended.state.frames.has_majority() || contradicts_scale)
 }
 
-/// The end without a solution: poses that nothing determines are those given.
+/// The end without a solution, for a reason and with what is known of the frames: poses that nothing
+/// determines are those given.
 fn unsolved(
     setup: &Setup,
     session: &mut Session,
-    reason: &RejectionReason,
-    rejections: Vec<Option<RejectionReason>>,
-) -> Outcome {
-    Outcome::refined(without_solution(setup, session, reason, rejections))
+    (reason, frames): (&RejectionReason, Option<FrameStates>),
+    readings: OtherReadings,
+) -> Result<Outcome, RefineError> {
+    let rejections = frames.map_or_else(|| vec![None; setup.count()], |frames| frames.rejections);
+    let mut refined = without_solution(setup, session, reason, rejections);
+    refined.report.readings = readings;
+    Ok(Outcome::refined(refined))
 }

@@ -11,6 +11,7 @@ use crate::uncertainty::model_error::ModelErrorReport;
 use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::uncertainty::shape_report::ShapeReport;
 use crate::verdict::length_scale::LengthScale;
+use crate::verdict::other_readings::OtherReadings;
 use crate::verdict::prior_test::PriorTest;
 use crate::verdict::rig_report::MountReport;
 use crate::verdict::survey_verdict::SurveyVerdict;
@@ -209,6 +210,10 @@ pub struct RefineReport {
     /// Self-calibration, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,
+    /// Other readings of poses, pictures and camera, if they were compared: where many frames fit
+    /// nowhere.
+    #[serde(skip_serializing_if = "OtherReadings::are_untried")]
+    pub readings: OtherReadings,
     /// The reason for which the last solve stopped, in words.
     pub stopped_because: String,
     /// Time by stage.

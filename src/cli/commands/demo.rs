@@ -3,7 +3,7 @@
 use super::compare::stage_comparison;
 use super::overlay::leave_out_overlay;
 use super::refine_files::{check_outputs, stage_refined};
-use super::refine_summary::{OtherReadings, print_summary};
+use super::refine_summary::print_summary;
 use super::report::stage_report;
 use crate::cli::arguments::output_folder;
 use crate::cli::output::{DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json};
@@ -117,7 +117,7 @@ pub fn run(
     )?;
     outputs.commit()?;
     if !terminal.is_json() {
-        print_summary(&refined.report, OtherReadings::Untried, false, terminal);
+        print_summary(&refined.report, false, terminal);
     }
 
     let poses = folders.refined.join("poses.tum");

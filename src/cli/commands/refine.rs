@@ -12,16 +12,14 @@ use crate::cli::commands::refine_files::{
 use crate::cli::commands::refine_follow::follow;
 use crate::cli::commands::refine_memory::check_memory;
 use crate::cli::commands::refine_shards::{read_shards, write_shard};
-use crate::cli::commands::refine_summary::{OtherReadings, print_outputs, print_summary};
+use crate::cli::commands::refine_summary::{print_outputs, print_summary};
 use crate::cli::output::{
     DryRunArguments, Failure, Job, RUN_FILE, RunRecord, Terminal, json, record,
 };
 use crate::follow::PREVIEW_FILES;
 use crate::persist::shard_number::ShardNumber;
-use crate::progress::Progress;
 use crate::refine::{
-    FrameFlag, Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, WallPoints,
-    can_search_readings, check_input, search_readings,
+    Photometry, RefineInput, RefineOptions, RefineReport, ShapeMode, WallPoints, check_input,
 };
 use crate::survey::{CalibrationGroup, Survey};
 use std::path::PathBuf;
@@ -264,17 +262,10 @@ pub fn run(
         outputs.commit()?;
         Ok((refined.report, json, files))
     })?;
-    // Frames that fit at two places, or tell too little, are read rightly.
-    let is_wrong = 2 * report.count_flagged(FrameFlag::Prior) > survey.frames.len();
-    let readings = if is_wrong && can_search_readings(&survey) {
-        try_readings(&survey, terminal)?
-    } else {
-        OtherReadings::Untried
-    };
     if terminal.is_json() {
         json::print_text(&json)?;
     } else {
-        print_summary(&report, readings, arguments.verbose, terminal);
+        print_summary(&report, arguments.verbose, terminal);
         if arguments.joint && !report.levels.iter().any(|level| level.joint) {
             terminal.say(
                 "  refined without --joint: the wall is smooth, so it has no detail below a pixel \
@@ -383,17 +374,4 @@ impl RefineArguments {
             }
         }
     }
-}
-
-/// Searches for a reading of poses and pictures that the frames agree with, and warns if there is
-/// one.
-fn try_readings(survey: &Survey, terminal: &Terminal) -> Result<OtherReadings, Failure> {
-    terminal.start("readings", 1);
-    let found = search_readings(survey);
-    terminal.finish();
-    let Some(found) = found? else {
-        return Ok(OtherReadings::NoneFits);
-    };
-    terminal.warn(found.sentence());
-    Ok(OtherReadings::Named)
 }

@@ -3,19 +3,18 @@
 use crate::cli::output::{Terminal, duration_text};
 use crate::files::printed;
 use crate::refine::{
-    CalibrationReport, FrameFlag, FrameReport, Photometry, ReadoutEstimate, RefineReport,
+    CalibrationReport, FrameFlag, FrameReport, OtherReadings, Photometry, ReadoutEstimate,
+    RefineReport,
 };
 use crate::report::{REFINEMENT_FILE, SECTIONS_FILE};
 use std::path::Path;
 
 /// Prints what was done, how good it is, and warnings about frames; with `verbose` also the table
 /// of global solves and the time of each stage.
-pub fn print_summary(
-    report: &RefineReport,
-    readings: OtherReadings,
-    verbose: bool,
-    terminal: &Terminal,
-) {
+pub fn print_summary(report: &RefineReport, verbose: bool, terminal: &Terminal) {
+    if let OtherReadings::Fit(found) = &report.readings {
+        terminal.warn(found.sentence());
+    }
     print_work(report, terminal);
     if verbose {
         print_solves(report, terminal);
@@ -26,7 +25,7 @@ pub fn print_summary(
         print_calibration(calibration, terminal);
     }
     print_findings(report, terminal);
-    warn_of_frames(report, readings, terminal);
+    warn_of_frames(report, terminal);
 }
 
 /// Prints what was done and how long it took.
@@ -237,7 +236,7 @@ fn rolling_shutter_warning(rows: &ReadoutEstimate) -> String {
 }
 
 /// Warns of the frames that are rejected.
-fn warn_of_frames(report: &RefineReport, readings: OtherReadings, terminal: &Terminal) {
+fn warn_of_frames(report: &RefineReport, terminal: &Terminal) {
     let all = report.frames.len();
     let uncertain = report.count_flagged(FrameFlag::Uncertain);
     if uncertain > 0 {
@@ -253,35 +252,24 @@ fn warn_of_frames(report: &RefineReport, readings: OtherReadings, terminal: &Ter
     }
     let contradicts = report.prior_test.contradicting_scale().is_some();
     if report.frames_on_prior == report.frames.len() && !contradicts {
-        terminal.warn(explain_failure(report, readings));
+        terminal.warn(explain_failure(report));
     }
     warn_of_rejected_frames(report, terminal);
 }
 
-/// Result of a search for other readings of poses, pictures and camera.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OtherReadings {
-    /// They were not compared.
-    Untried,
-    /// Neighbouring frames agree better with none of them.
-    NoneFits,
-    /// Neighbouring frames agree better with one, which is named.
-    Named,
-}
-
 /// The finding where no frame is photometric. It proposes nothing that was not tried.
-fn explain_failure(report: &RefineReport, readings: OtherReadings) -> &'static str {
+fn explain_failure(report: &RefineReport) -> &'static str {
     if 2 * report.count_flagged(FrameFlag::Ambiguous) > report.frames.len() {
         "  no frame is photometric: the wall repeats itself, and [prior] does not tell its \
          repetitions apart"
     } else {
-        match readings {
+        match report.readings {
             OtherReadings::NoneFits => {
                 "  no frame is photometric; other readings were tried (convention, axes, order and \
                  unit of the poses, poses of other frames, radius, turned and mirrored pictures, \
                  focal length and lens), and neighbouring frames agree better with none of them"
             }
-            OtherReadings::Untried | OtherReadings::Named => "  no frame is photometric",
+            OtherReadings::Untried | OtherReadings::Fit(_) => "  no frame is photometric",
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::network_map::MapError;
 use crate::persist::atomic::WriteError;
 use crate::persist::checkpoint::CheckpointError;
 use crate::raster::RasterError;
-use crate::refine::{CovarianceError, ProblemError, ReadingSearchError, RefineError};
+use crate::refine::{CovarianceError, ProblemError, RefineError};
 use crate::render::RenderError;
 use crate::report::ReportError;
 use crate::simulate::SimulateError;
@@ -174,15 +174,6 @@ impl From<FollowError> for Failure {
             FollowError::Survey(error) => error.into(),
             FollowError::Write(error) => error.into(),
             FollowError::Render(error) => error.into(),
-        }
-    }
-}
-
-impl From<ReadingSearchError> for Failure {
-    fn from(error: ReadingSearchError) -> Self {
-        match error {
-            ReadingSearchError::Survey(error) => error.into(),
-            ReadingSearchError::Refine(error) => error.into(),
         }
     }
 }

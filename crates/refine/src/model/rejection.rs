@@ -67,6 +67,8 @@ pub enum RejectionReason {
         /// Number of frames that show something.
         shown: usize,
     },
+    /// Neighbouring frames agree with another reading of the survey.
+    Misread,
     /// The equations of the survey have no solution.
     Unsolved,
     /// It was not tried, as none of those before it matched.
@@ -93,6 +95,13 @@ impl RejectionReason {
     /// than the user asks for. If its place is not even known to a pixel, it may fit by chance.
     pub fn is_uncertain(&self) -> bool {
         matches!(self, Self::Uncertain { wall_px } if *wall_px < 1.0)
+    }
+
+    /// True if the image shows something that fits nowhere, or not the other frames. Frames that
+    /// fit at two places, or tell too little, do not speak against the others.
+    pub fn is_stray(&self) -> bool {
+        let is_undecided = matches!(self, Self::Ambiguous { .. } | Self::Uncertain { .. });
+        !self.shows_nothing() && !is_undecided
     }
 
     /// True if the image shows a wall that does not fit the other frames.
@@ -188,6 +197,10 @@ impl fmt::Display for RejectionReason {
                 f,
                 "only {frames} of {shown} frames fit each other, which may be chance where so \
                  many do not"
+            ),
+            Self::Misread => write!(
+                f,
+                "neighbouring frames agree with another reading of poses, pictures or camera"
             ),
             Self::Unsolved => write!(f, "the equations of the survey have no solution"),
             Self::LeftOut => write!(f, "it was not looked at, since tracking was behind"),

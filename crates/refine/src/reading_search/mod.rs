@@ -11,10 +11,8 @@
 //! ```
 
 mod comparison;
-mod finding;
 mod picture_pairs;
 mod search;
 mod telling_pairs;
 
-pub use finding::FittingReadings;
-pub use search::{ReadingSearchError, can_search_readings, search_readings};
+pub use search::search_readings;

@@ -1,14 +1,14 @@
 //! The search: all readings against the one given.
 
 use super::comparison::{Comparison, exceeds_scatter};
-use super::finding::FittingReadings;
 use super::picture_pairs::PicturePairs;
 use super::telling_pairs::{TellingPair, telling_pairs};
 use crate::error::RefineError;
 use crate::options::RefineOptions;
 use crate::tracking::neighbour_pairs::first_frames;
 use crate::tracking::registration::{MAX_DEVIATION_COST, Registered};
-use tunnelstitch_core::survey::{PoseReading, Survey, SurveyError};
+use crate::verdict::other_readings::FittingReadings;
+use tunnelstitch_core::survey::{PoseReading, Survey};
 
 /// Smallest number of pairs: fewer may fit by chance.
 const MIN_PAIRS: usize = 4;
@@ -18,17 +18,6 @@ const MAX_DEFICIT_NATS: f64 = 3.0;
 /// Evidence of a pair that speaks for poses of other frames, nats: half of that by which its steps
 /// differ at least.
 const MIN_SHIFT_NATS: f64 = 0.5 * MAX_DEVIATION_COST;
-
-/// A survey whose readings cannot be searched.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadingSearchError {
-    /// The poses cannot be read in all readings.
-    #[error(transparent)]
-    Survey(#[from] SurveyError),
-    /// A frame cannot be read, or the input is none to refine.
-    #[error(transparent)]
-    Refine(#[from] RefineError),
-}
 
 /// A reading that neighbouring frames agree with.
 struct Found<'r> {
@@ -75,12 +64,13 @@ impl Found<'_> {
 /// readings by pairs that are evenly distributed.
 ///
 /// # Errors
-/// [`ReadingSearchError`].
-pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, ReadingSearchError> {
+/// [`RefineError`]: poses that cannot be read in all readings, a frame that cannot be read, or input
+/// that is none to refine.
+pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, RefineError> {
     if !can_search_readings(survey) {
         return Ok(None);
     }
-    let readings = survey.pose_readings()?;
+    let readings = survey.pose_readings().map_err(Box::new)?;
     let least_nats = (readings.len() as f64 / RefineOptions::default().false_alarm_rate).ln();
     let Some((given, others)) = readings.split_first() else {
         return Ok(None);
@@ -94,7 +84,7 @@ pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, Readi
 
 /// True if a survey has pairs of neighbouring frames by which readings can be compared: it has
 /// frames enough, and they are not those of a rig.
-pub fn can_search_readings(survey: &Survey) -> bool {
+fn can_search_readings(survey: &Survey) -> bool {
     !survey.cameras.is_rig() && first_frames(survey.frames.len()).len() >= MIN_PAIRS
 }
 

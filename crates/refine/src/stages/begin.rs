@@ -6,6 +6,7 @@ use crate::parameters::unseen_errors::UnseenErrors;
 use crate::stages::plan::plan_stages;
 use crate::stages::setup::Setup;
 use crate::stages::state::PipelineState;
+use crate::verdict::other_readings::OtherReadings;
 use tunnelstitch_core::frames::PictureNoise;
 
 /// The state before the first stage.
@@ -21,6 +22,7 @@ pub fn begin(setup: &Setup) -> PipelineState {
         noise: PictureNoise::default(),
         has_common_light: true,
         is_lamp_ruled_out: false,
+        readings: OtherReadings::Untried,
         dispersion: 1.0,
         frames,
         kappa: Kappa::zeros(),

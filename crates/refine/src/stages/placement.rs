@@ -21,6 +21,7 @@ use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::uncertainty::shape_report::{EstimatedShape, ShapeReport};
 use crate::verdict::bridging::Bridging;
 use crate::verdict::length_scale::LengthScale;
+use crate::verdict::other_readings::OtherReadings;
 use crate::verdict::prior_test::{GivenLengths, PriorTest};
 use crate::verdict::rig_report::MountReport;
 use crate::verdict::survey_verdict::SurveyVerdict;
@@ -266,6 +267,7 @@ impl Placement {
                     .map(|(bend, sigma_per_m)| BendReport::new(bend, sigma_per_m)),
                 points,
                 calibration: parts.calibration,
+                readings: OtherReadings::Untried,
                 timings: parts.timings,
             },
             covariances: self.covariances,

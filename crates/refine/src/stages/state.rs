@@ -13,6 +13,7 @@ use crate::stages::plan::Stage;
 use crate::tracking::alternating_calibration::AlternatingCalibration;
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
+use crate::verdict::other_readings::OtherReadings;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use tunnelstitch_core::frames::{Light, PictureNoise};
@@ -30,6 +31,8 @@ pub struct PipelineState {
     pub has_common_light: bool,
     /// True if most frames did not fit in the light of a lamp.
     pub is_lamp_ruled_out: bool,
+    /// Other readings of the survey, once they are compared.
+    pub readings: OtherReadings,
     /// Dispersion of the residuals ([`crate::uncertainty::model_error`]), once it is known.
     pub dispersion: f64,
     /// The frames: estimates (none before they are tracked) and rejection reasons.

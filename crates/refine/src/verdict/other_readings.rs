@@ -1,10 +1,38 @@
-//! The readings that a search has found.
+//! Other readings of poses, pictures and camera than those given, in which frames fit.
+
+use serde::{Deserialize, Serialize};
 
 /// Largest power of ten of odds that is printed: no prior is right so far out.
 const MAX_ODDS_POWER: f64 = 20.0;
 
+/// The result of a search for other readings of a survey ([`crate::reading_search`]).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OtherReadings {
+    /// They were not compared.
+    #[default]
+    Untried,
+    /// Neighbouring frames agree better with none of them.
+    NoneFits,
+    /// Neighbouring frames agree better with these.
+    Fit(FittingReadings),
+}
+
+impl OtherReadings {
+    /// True if they were not compared.
+    pub fn are_untried(&self) -> bool {
+        *self == Self::Untried
+    }
+}
+
+impl From<Option<FittingReadings>> for OtherReadings {
+    fn from(found: Option<FittingReadings>) -> Self {
+        found.map_or(Self::NoneFits, Self::Fit)
+    }
+}
+
 /// Readings that neighbouring frames agree with rather than with the one given.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FittingReadings {
     /// The readings, each as it is asked for.
     pub readings: Vec<String>,
