@@ -276,8 +276,8 @@ fn fits_light(ended: &Estimation) -> bool {
     ended.state.has_common_light && (ended.state.frames.has_majority() || contradicts_scale)
 }
 
-/// The end without a solution, for a reason and with what is known of the frames: poses that nothing
-/// determines are those given.
+/// The end without a solution, for a reason and with what is known of the frames: poses that
+/// nothing determines are those given.
 fn unsolved(
     setup: &Setup,
     session: &mut Session,

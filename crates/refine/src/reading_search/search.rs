@@ -64,8 +64,8 @@ impl Found<'_> {
 /// readings by pairs that are evenly distributed.
 ///
 /// # Errors
-/// [`RefineError`]: poses that cannot be read in all readings, a frame that cannot be read, or input
-/// that is none to refine.
+/// [`RefineError`]: poses that cannot be read in all readings, a frame that cannot be read, or
+/// input that is none to refine.
 pub fn search_readings(survey: &Survey) -> Result<Option<FittingReadings>, RefineError> {
     if !can_search_readings(survey) {
         return Ok(None);
