@@ -97,9 +97,7 @@ pub fn run<'a>(
     }
     // The assessment uses the last one only.
     if let Some(uncertainty) = uncertainty.filter(|_| !has_solve_ahead(state)) {
-        let dispersion = uncertainty
-            .model_error
-            .map_or(1.0, |found| found.dispersion);
+        let dispersion = uncertainty.dispersion();
         if is_close_for_finer(&plan, setup, &context, state)? {
             plan_again(&plan, setup.options, state);
         } else if state.dispersion == 1.0 && dispersion > 1.0 {

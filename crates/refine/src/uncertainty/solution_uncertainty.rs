@@ -136,6 +136,16 @@ impl SolutionUncertainty {
         })
     }
 
+    /// Dispersion of the scores of pixels: of those of patches, or of blocks if all is noise; 1
+    /// where the equations are singular.
+    pub fn dispersion(&self) -> f64 {
+        let of_noise = |total: &TotalCovariance| total.of_noise.pixel_dispersion;
+        match &self.model_error {
+            Some(found) => found.dispersion,
+            None => self.total.as_ref().map_or(1.0, of_noise),
+        }
+    }
+
     /// Computes 1-σ of frame `k` at its estimate.
     pub fn frame_sigma(
         &self,
