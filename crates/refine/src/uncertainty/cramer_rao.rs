@@ -28,8 +28,8 @@
 //!
 //! Where the wall deviates from its drawing by a random field of known size, the coefficients of
 //! its shape ([`crate::parameters::shape`]) are unknowns beside the poses, with the field's prior
-//! ([`crate::parameters::wall_prior`]). All three bounds then are those of poses with the wall
-//! unknown.
+//! ([`crate::parameters::wall_prior`]), which ties all of them to each other. All three bounds then
+//! are those of poses with the wall unknown.
 //!
 //! # Accuracy of the bound
 //!
@@ -43,13 +43,14 @@
 use crate::error::RefineError;
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
+use crate::linear::sparse_cholesky::SymbolicFactorisation;
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::frame_states::FrameStates;
 use crate::model::prior::Prior;
 use crate::options::RefineOptions;
 use crate::parameters::calibration::{Calibration, Kappa};
 use crate::parameters::shape::Shape;
-use crate::parameters::wall_prior::WallPrior;
+use crate::parameters::wall_prior::{FieldInformation, WallPrior};
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::problem::unknown_texture::UnknownTexture;
 use crate::samples::footprints::{extent_h_m, footprints};
@@ -139,7 +140,7 @@ pub fn pose_bounds(
     let extent_h_m = extent_h_m(&footprints(&flat, &frames)?);
     let model = wall.model(survey.nominal.perimeter_m(), extent_h_m);
     let context = EstimationContext {
-        shape: (model.blocks() > 0).then(|| Arc::new(Shape::nominal(model))),
+        shape: (model.blocks() > 0).then(|| Arc::new(Shape::nominal(model.clone()))),
         ..flat
     };
     let estimates = frames.estimates;
@@ -159,17 +160,18 @@ pub fn pose_bounds(
     let noise_grey = f64::from(FINER) * noise_grey;
     let problem = PhotometricProblem::new(&context, sampling, window)?.with_known_noise(noise_grey);
     let unknowns = problem.unknowns_of(&estimates);
+    let field = FieldPrior::new(problem.pattern(), count, wall.information(&model));
     let (prior, _) = problem.prior_information(&unknowns, problem.pattern());
     let with_prior = problem.linearise(&estimates)?.normal;
-    let bayesian = invert(&problem, &with_prior, count)?;
+    let bayesian = invert(&problem, &field, &with_prior, count)?;
     let pixels = subtract_pose_prior(problem.pattern(), &prior, with_prior, count);
-    let known = invert(&problem, &pixels, count)?;
+    let known = invert(&problem, &field, &pixels, count)?;
     let problem = problem.with_unknown_texture(texture);
     let with_prior = problem.linearise(&estimates)?.normal;
     let pixels = subtract_pose_prior(problem.pattern(), &prior, with_prior, count);
     Ok(PoseBounds {
         known,
-        unknown: invert(&problem, &pixels, count)?,
+        unknown: invert(&problem, &field, &pixels, count)?,
         bayesian,
     })
 }
@@ -191,13 +193,56 @@ fn subtract_pose_prior(
     normal
 }
 
-/// Inverts an information matrix, for each of `count` frames and for each pair of neighbours.
+/// The prior of the wall's deformation, and the pattern of equations with it.
+struct FieldPrior {
+    pattern: Pattern,
+    /// Blocks by row and column of the pattern.
+    information: FieldInformation,
+}
+
+impl FieldPrior {
+    /// The prior in equations on `without`, where the wall's coefficients come behind `frames`
+    /// slots.
+    fn new(without: &Pattern, frames: usize, information: FieldInformation) -> Self {
+        let place = |((row, column), block)| ((frames + row, frames + column), block);
+        let information: FieldInformation = information.into_iter().map(place).collect();
+        let columns = without.columns();
+        let pairs = (0..columns).flat_map(|k| without.rows(k).iter().map(move |row| (*row, k)));
+        let of_field = information.iter().map(|(place, _)| *place);
+        Self {
+            pattern: Pattern::new(columns, pairs.chain(of_field)),
+            information,
+        }
+    }
+
+    /// The equations with the prior; `normal` is on the pattern `without`.
+    fn added_to(&self, without: &Pattern, normal: &NormalEquations) -> NormalEquations {
+        let mut sum = NormalEquations::zeros(&self.pattern);
+        let mut blocks = normal.blocks.iter();
+        for column in 0..without.columns() {
+            for (row, block) in without.rows(column).iter().zip(&mut blocks) {
+                sum.add_block(&self.pattern, *row, column, block);
+            }
+        }
+        for ((row, column), block) in &self.information {
+            sum.add_block(&self.pattern, *row, *column, block);
+        }
+        sum
+    }
+}
+
+/// Inverts an information matrix with the prior of the wall, for each of `count` frames and for
+/// each pair of neighbours.
 fn invert(
     problem: &PhotometricProblem,
+    field: &FieldPrior,
     normal: &NormalEquations,
     count: usize,
 ) -> Result<Covariances, RefineError> {
-    let factor = problem.symbolic().factorise(normal, 0.0);
+    let normal = field.added_to(problem.pattern(), normal);
+    let symbolic = SymbolicFactorisation::new(&field.pattern);
+    let symbolic = symbolic.map_err(|source| problem.factor_error(source))?;
+    let factor = symbolic.factorise(&normal, 0.0);
     let inverse = SelectedInverse::new(&factor.map_err(|source| problem.factor_error(source))?);
     let pose = |row: usize, column: usize| {
         let block = inverse.block(row, column);
