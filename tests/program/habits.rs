@@ -130,11 +130,25 @@ fn init_names_faults_of_files_that_it_recognised() {
     camera["fx"] = 5.2.into();
     std::fs::write(dir.join("camera.json"), camera.to_string()).unwrap();
     let (said, _) = init(dir);
-    assert!(said.contains("there are no poses: poses.csv has"), "{said}");
+    let lines = "write euler = \"ZYX\" and angle_unit = \"deg\" (or \"rad\") in [poses]";
+    assert!(
+        said.contains("poses.csv:1: ") && said.contains(lines),
+        "{said}"
+    );
     assert!(
         said.contains("camera.json is not used, and a pinhole is guessed"),
         "{said}"
     );
+    // The lines of the message are all that is missing.
+    let toml = dir.join("survey.toml");
+    let written = std::fs::read_to_string(&toml).unwrap();
+    assert!(written.contains("initial = \"poses.csv\""), "{written}");
+    let table = "tx,ty,tz,roll,pitch,yaw\n0,0,0,0,0,0\n0,0.1,0,0,20,0\n0,0.2,0,0,40,0\n";
+    std::fs::write(dir.join("poses.csv"), table).unwrap();
+    let angles = "[poses]\neuler = \"ZYX\"\nangle_unit = \"deg\"\n";
+    std::fs::write(&toml, written.replace("[poses]\n", angles)).unwrap();
+    let poses = succeed(&["convert", text(dir), "--to", "tum", "--out", "-"]);
+    assert_eq!(poses.lines().count(), 3, "{poses}");
 }
 
 #[test]

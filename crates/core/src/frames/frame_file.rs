@@ -1,5 +1,6 @@
 //! Frames as files, as pictures of a video or a recording, or in memory.
 
+use super::counter_overrun;
 use super::error::FrameError;
 use super::picture_reading::PictureReading;
 use super::recorded_images::RecordedImages;
@@ -288,8 +289,9 @@ fn is_hidden(path: &Path) -> bool {
 }
 
 /// Lists the files that match `pattern` (glob syntax, relative to `folder`, a backslash taken for a
-/// slash), in the natural order of their names (`frame2` before `frame10`), without the mask and
-/// without hidden ones, whose names begin with a dot.
+/// slash), in the natural order of their names (`frame2` before `frame10`), from the first if their
+/// counter began anew after its last number (`f9999` before `f0001`), without the mask and without
+/// hidden ones, whose names begin with a dot.
 ///
 /// # Errors
 /// A malformed pattern, an unreadable folder, no match.
@@ -331,6 +333,9 @@ pub fn list_frames(
     let mut paths: Vec<(String, PathBuf)> =
         paths.into_iter().map(|path| (lower(&path), path)).collect();
     paths.sort_by(|a, b| compare_str(&a.0, &b.0).then_with(|| a.1.cmp(&b.1)));
+    let names: Vec<&str> = paths.iter().map(|(name, _)| name.as_str()).collect();
+    let first = counter_overrun::first_place(&names).unwrap_or(0);
+    paths.rotate_left(first);
     if paths.is_empty() {
         return Err(FrameError::NoFrames {
             pattern: pattern.to_owned(),

@@ -2,6 +2,7 @@
 
 mod cache;
 mod combing;
+mod counter_overrun;
 mod decode;
 mod error;
 mod frame_file;

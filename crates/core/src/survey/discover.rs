@@ -363,6 +363,17 @@ impl Discovery {
         self.poses.iter().find(|(path, _)| !is_truth(path))
     }
 
+    /// The only file that was recognised as poses but is faulty, with the reason, if no other has
+    /// poses.
+    pub(super) fn faulty_poses(&self) -> Option<&LeftAside> {
+        let mut faulty = self
+            .left_aside
+            .iter()
+            .filter(|aside| aside.is_faulty_pose_file());
+        let only = faulty.next().filter(|aside| aside.count == 1);
+        only.filter(|_| faulty.next().is_none() && self.initial().is_none())
+    }
+
     /// The ground truth, if a file is named so.
     pub fn truth(&self) -> Option<&(PathBuf, PoseFile)> {
         self.poses.iter().find(|(path, _)| is_truth(path))
@@ -411,7 +422,8 @@ fn picture_files(files: &[PathBuf]) -> PictureFiles<'_> {
 /// True if a file may hold poses, by its name; `extension` is in lower case.
 fn is_pose_file(file: &Path, extension: &str) -> bool {
     match extension {
-        "txt" | "tum" | "csv" | "json" | "kitti" | "out" | "sfm" | "xml" => true,
+        "txt" | "tum" | "csv" | "tsv" | "tab" | "dat" | "asc" | "log" | "traj" | "opk" | "json"
+        | "kitti" | "out" | "sfm" | "xml" => true,
         "bin" => file.ends_with("images.bin"),
         _ => false,
     }

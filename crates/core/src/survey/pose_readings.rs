@@ -19,10 +19,12 @@ use tunnelstitch_geometry::trajectory::{
 };
 
 /// Units that positions may be given in instead of metres: their names, and their lengths, metres.
-const UNITS: [(&str, f64); 3] = [
+const UNITS: [(&str, f64); 5] = [
     ("millimetres", 0.001),
     ("centimetres", 0.01),
+    ("inches", 0.0254),
     ("feet", 0.3048),
+    ("kilometres", 1000.0),
 ];
 
 /// Radii of a round tunnel over the given one that people confuse, and what they gave.

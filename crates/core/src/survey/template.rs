@@ -211,6 +211,14 @@ impl Discovery {
     /// Writes the initial poses of `[poses]` and how they are associated with the frames.
     fn write_initial_poses(&self, text: &mut String) {
         let (count, _) = self.frames();
+        if let Some(faulty) = self.faulty_poses() {
+            let _ = writeln!(
+                text,
+                "initial = {}    # not read as yet: tunnelstitch check says what it lacks",
+                quoted(&faulty.pattern)
+            );
+            return;
+        }
         let Some((path, poses)) = self.initial() else {
             *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC, OpenSfM, \
                       Bundler, Meshroom, OpenMVG, Metashape, RealityCapture, Pix4D or a \

@@ -108,8 +108,9 @@ impl TunnelSection {
             .filter(|radius_m| *radius_m > MAX_USUAL_RADIUS_M)?;
         Some(format!(
             "tunnel.radius_m is {radius_m}, and no tunnel is so wide; if it is in millimetres, \
-             write radius_m = {}",
-            radius_m / 1e3
+             write radius_m = {}, if in inches, radius_m = {}",
+            radius_m / 1e3,
+            (radius_m * 25.4).round() / 1e3
         ))
     }
 

@@ -47,11 +47,18 @@ pub(super) fn detect_format(
             what,
         });
     }
-    let words = row::words(line).map_err(|what| PoseError::line(path, number, what))?;
+    let words = row::NamedRow::of(line)
+        .map_err(|what| PoseError::line(path, number, what))?
+        .words;
     let numbers = words.iter().filter(|word| float(word).is_some()).count();
     match (numbers, words.len()) {
         // A line of a wrong length is reported by the parser of the nearest format.
-        (12, 12) | (kitti::WHOLE_MATRIX, kitti::WHOLE_MATRIX) => Ok(PoseFormat::Kitti),
+        (most, all)
+            if most + 1 >= all
+                && (kitti::is_matrix(all) || kitti::is_matrix(all.saturating_sub(1))) =>
+        {
+            Ok(PoseFormat::Kitti)
+        }
         (most, all) if most >= 5 && all <= 9 => Ok(PoseFormat::Tum),
         _ => Err(PoseError::OtherKind {
             path: path.to_owned(),

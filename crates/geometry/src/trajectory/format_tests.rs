@@ -326,10 +326,57 @@ fn tables_of_spreadsheets_and_of_ros_are_read() {
         .collect();
     let file = read_poses(&file_of(&bytes).1, None).unwrap();
     assert_eq!(file.entries[1].time_s, Some(0.75));
-    // Where commas separate, they are no decimal commas.
-    let quoted = "time_s,tx,ty,tz,qx,qy,qz,qw\n0,\"1,5\",0,0,0,0,0,1\n";
-    let message = read_text(quoted).unwrap_err().to_string();
-    assert!(message.contains(":2: `1,5` is not a number"), "{message}");
+    // Where commas separate, a quoted one may stand before thousands.
+    let quoted = |number: &str| {
+        read_text(&format!(
+            "time_s,tx,ty,tz,qx,qy,qz,qw\n0,\"{number}\",0,0,0,0,0,1\n"
+        ))
+    };
+    assert_eq!(quoted("1,5").unwrap().entries[0].pose.t_wc.x, 1.5);
+    let message = quoted("1,500").unwrap_err().to_string();
+    assert!(message.contains(":2: `1,500` is not a number"), "{message}");
+}
+
+/// Rows without a header: with the name of the frame, a counter, without times; matrices with a
+/// time or a name.
+#[test]
+fn rows_tell_their_form_by_what_they_hold() {
+    let tum = "5 1 2 3 0 0 0.6 0.8\n6 1 2 3 0 0 0.6 0.8\n";
+    let pose = read_text(tum).unwrap().entries[0].pose;
+    let with = |rows: [&str; 2]| read_text(&format!("{}\n{}\n", rows[0], rows[1])).unwrap();
+    let named = with(["a.png 1 2 3 0 0 0.6 0.8", "b.png 1 2 3 0 0 0.6 0.8"]);
+    assert_eq!(named.entries[1].name.as_deref(), Some("b.png"));
+    assert_eq!(
+        (named.entries[0].pose, named.entries[0].time_s),
+        (pose, None)
+    );
+    let last = with(["5,1,2,3,0,0,0.6,0.8,a.png", "6,1,2,3,0,0,0.6,0.8,b.png"]);
+    assert_eq!(last.entries[1].time_s, Some(6.0));
+    let counted = with(["0 5 1 2 3 0 0 0.6 0.8", "1 6 1 2 3 0 0 0.6 0.8"]);
+    assert_eq!(counted.entries, read_text(tum).unwrap().entries);
+    let seven = with(["1 2 3 0 0 0.6 0.8", "1 2 3 0 0 0.6 0.8"]);
+    assert_eq!(
+        (seven.entries[1].pose, seven.entries[1].time_s),
+        (pose, None)
+    );
+    let matrix = "0.28 -0.96 0 1 0.96 0.28 0 2 0 0 1 3";
+    let plain = with([matrix, matrix]).entries[0].pose;
+    for prefix in ["a.png ", "7.5 ", "a.png 7.5 "] {
+        let rows = [
+            format!("{prefix}{matrix}"),
+            format!("{prefix}{matrix} 0 0 0 1"),
+        ];
+        let rows = rows.map(|row| row.replace("a.png", "c.png"));
+        let file = with([&rows[0], &rows[1].replace("c.png", "d.png")]);
+        assert_eq!(file.entries[1].pose, plain);
+        assert_eq!(
+            file.entries[1].time_s,
+            prefix.contains("7.5").then_some(7.5)
+        );
+    }
+    // Poses with angles are not taken for such without times.
+    let angles = read_text("0 1 2 3 10 20 30\n").unwrap_err().to_string();
+    assert!(angles.contains("the quaternion has length"), "{angles}");
 }
 
 #[test]

@@ -16,7 +16,9 @@ const WITH_ZONE: &str = "%Y-%m-%dT%H:%M:%S%.f%#z";
 ///
 /// A blank or `_` may stand for the `T`, and a zone as `+01:00` for the `Z`; without one it is UTC.
 pub fn seconds(word: &str) -> Option<f64> {
-    let Some((date, time)) = word.split_once(['T', 't', ' ', '_']) else {
+    let with_slashes = slashed_date(word);
+    let parts = with_slashes.as_ref().map(|(date, time)| (&**date, *time));
+    let Some((date, time)) = parts.or_else(|| word.split_once(['T', 't', ' ', '_'])) else {
         let time = NaiveTime::parse_from_str(word, TIME_OF_DAY).ok()?;
         return Some(f64::from(time.num_seconds_from_midnight()) + decimals(time.nanosecond()));
     };
@@ -30,6 +32,13 @@ pub fn seconds(word: &str) -> Option<f64> {
         Err(_) => without_zone().ok()?.and_utc(),
     };
     Some(utc.timestamp() as f64 + decimals(utc.timestamp_subsec_nanos()))
+}
+
+/// Date and time of `2026/11/25/08:47:38.123`, as rosbag_to_csv writes it, or with a blank between.
+fn slashed_date(word: &str) -> Option<(String, &str)> {
+    let (date, time) = word.split_at_checked(DATE_DIGITS)?;
+    let time = time.strip_prefix(['/', ' ', 'T', '_'])?;
+    (date.matches('/').count() == 2).then(|| (date.replace('/', "-"), time))
 }
 
 /// Nanoseconds in seconds: more than one in a leap second, which is the last of its minute.
@@ -50,6 +59,8 @@ mod tests {
             ("2026-11-25T08:47:38.123", 1795596458.123),
             ("2026-11-25 09:47:38.5+01:00", 1795596458.5),
             ("2026-11-25_05:47:38-0300", 1795596458.0),
+            ("2026/11/25/08:47:38.123", 1795596458.123),
+            ("2026/11/25 08:47:38.5", 1795596458.5),
             ("2024-02-29T12:00:00+00", 1709208000.0),
             ("2000-03-01T00:00:00Z", 951868800.0),
             ("08:47:38.25", 31658.25),
@@ -71,6 +82,7 @@ mod tests {
             "2026-13-25T00:00:00Z",
             "2026-02-30T00:00:00Z",
             "26-11-25T00:00:00Z",
+            "25/11/2026 08:47:38",
             "08:47",
             "24:00:00",
             "08:61:00",

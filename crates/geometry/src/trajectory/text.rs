@@ -72,9 +72,16 @@ pub(super) fn stamped_lines(
     parse_line: impl Fn(&str) -> Result<PoseEntry, String>,
 ) -> Result<ParsedPoses, PoseError> {
     let mut entries = EntryList::new(duplicates);
+    let mut names = Names::default();
     for (number, line) in lines(text) {
         parse_line(line)
-            .and_then(|entry| entries.push(number, entry))
+            .and_then(|entry| {
+                entry
+                    .name
+                    .as_deref()
+                    .map_or(Ok(()), |name| names.add(name))?;
+                entries.push(number, entry)
+            })
             .map_err(|what| PoseError::line(path, number, what))?;
     }
     Ok(entries.into_parsed())
@@ -114,13 +121,15 @@ pub(super) fn time(word: &str, unit: Option<TimeUnit>, form: &str) -> Result<f64
 }
 
 /// The number with a decimal point instead of a decimal comma, which it may have where commas do
-/// not separate, and without separators of thousands.
+/// not separate or it stands in quotes, and without separators of thousands.
 pub(super) fn with_decimal_point(word: &str, separator: u8) -> Cow<'_, str> {
     if let Some(number) = without_thousands(word) {
         return Cow::Owned(number);
     }
     match word.split_once(',') {
-        Some((whole, fraction)) if separator != b',' && !word.contains('.') => {
+        Some((whole, fraction))
+            if !word.contains('.') && (separator != b',' || is_decimal(whole, fraction)) =>
+        {
             let number = format!("{whole}.{fraction}");
             if float(&number).is_some() {
                 return Cow::Owned(number);
@@ -129,6 +138,11 @@ pub(super) fn with_decimal_point(word: &str, separator: u8) -> Cow<'_, str> {
         }
         _ => Cow::Borrowed(word),
     }
+}
+
+/// True for a decimal comma in a quoted cell, where it cannot be a separator of thousands.
+fn is_decimal(whole: &str, fraction: &str) -> bool {
+    fraction.len() != 3 || whole.trim_start_matches(['-', '+', '−']) == "0"
 }
 
 /// The number with a decimal point alone, if points and commas are in it: the last of them is

@@ -2,7 +2,8 @@
 //!
 //! Times of 17 digits and more are nanoseconds, as ORB-SLAM3 writes them, and a comment may name
 //! another unit, as `[ms]`. Commas, semicolons and tabs may separate, and a comment before the
-//! first pose may name `qw` first.
+//! first pose may name `qw` first. Times may be missing; a row may have a counter before the time,
+//! and the name of the frame anywhere.
 //!
 //! The program's own format. It is written with eight columns, single spaces and no trailing space,
 //! as `evo` requires.
@@ -13,20 +14,22 @@ use super::pose::Pose;
 use super::pose_entry::PoseEntry;
 use super::pose_options::PoseFileOptions;
 use super::quaternion_order::QuaternionOrder;
+use super::row::NamedRow;
 use super::stamped_pose::{StampedPose, Trajectory};
+use super::text;
 use super::time_unit::TimeUnit;
-use super::{row, text};
 use nalgebra::Vector3;
-use std::borrow::Cow;
 use std::fmt::Write;
 use std::path::Path;
 
 pub(super) const FORM: &str = "time tx ty tz qx qy qz qw";
+/// Numbers of a pose.
+const POSE: usize = 7;
 
 /// Reads a TUM file.
 ///
 /// # Errors
-/// An unreadable file; a line without exactly eight numbers; a number that is not finite; a
+/// An unreadable file; a line without the seven numbers of a pose; a number that is not finite; a
 /// quaternion of length zero (or farther than 1 % from unit length); times that do not increase; no
 /// pose at all.
 pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
@@ -54,37 +57,50 @@ pub(super) fn parse(
         .or_else(|| QuaternionOrder::of_comments(text))
         .unwrap_or_default();
     let unit = options.time_unit.or_else(|| TimeUnit::of_comments(text));
+    // Rows are alike: one that lacks a number is faulty, not without a time.
+    let first = text::lines(text).next();
+    let count = first.and_then(|(_, line)| Some(NamedRow::of(line).ok()?.words.len()));
     text::stamped_lines(path, text, options.duplicate_times, |line| {
-        parse_line(line, order, unit)
+        let row = NamedRow::of(line)?;
+        if Some(row.words.len()) != count {
+            return Err(wrong_count(row.words.len()));
+        }
+        parse_row(row, order, unit)
     })
 }
 
-fn parse_line(
-    line: &str,
+/// The error of a row with that many numbers.
+fn wrong_count(count: usize) -> String {
+    format!("{count} columns where `{FORM}` has 8")
+}
+
+fn parse_row(
+    row: NamedRow<'_>,
     order: QuaternionOrder,
     unit: Option<TimeUnit>,
 ) -> Result<PoseEntry, String> {
-    let [time, pose @ ..]: [Cow<'_, str>; 8] = row::exact_words(line, FORM).map_err(|what| {
-        let count = row::words(line).map_or(0, |words| words.len());
-        let has_no_time = count + 1 == FORM.split(' ').count();
-        let remedy = if has_no_time {
-            "; if times are missing, a first line `tx ty tz qx qy qz qw` says so"
-        } else {
-            ""
-        };
-        format!("{what}{remedy}")
-    })?;
-    let mut values = [0.0; 7];
-    for (value, word) in values.iter_mut().zip(&pose) {
+    let NamedRow { name, words } = row;
+    // A counter may precede the time, or the time may be missing.
+    let (before, pose) = words
+        .split_at_checked(words.len().saturating_sub(POSE))
+        .unwrap_or_default();
+    let is_counter = |word: &str| word.parse::<u64>().is_ok();
+    let time = match before {
+        [] if pose.len() == POSE => None,
+        [time] => Some(time),
+        [counter, time] if is_counter(counter) => Some(time),
+        _ => return Err(wrong_count(words.len())),
+    };
+    let mut values = [0.0; POSE];
+    for (value, word) in values.iter_mut().zip(pose) {
         *value = text::number(word, FORM)?;
     }
     let [tx, ty, tz, a, b, c, d] = values;
+    let time_s = time.map(|time| text::time(time, unit, FORM)).transpose();
     Ok(PoseEntry {
         camera: None,
-        name: None,
-        time_s: Some(
-            text::time(&time, unit, FORM).map_err(|what| with_remedy_of_names(&time, what))?,
-        ),
+        time_s: time_s.map_err(|what| with_remedy_of_names(&words[0], what))?,
+        name,
         pose: Pose::new(
             text::rotation(order.wxyz([a, b, c, d]), order.columns())?,
             Vector3::new(tx, ty, tz),
@@ -92,7 +108,7 @@ fn parse_line(
     })
 }
 
-/// The error of a time; if the word is the name of a picture, with what reads it.
+/// The error of a time; if the word is a name, with what reads it.
 fn with_remedy_of_names(word: &str, what: String) -> String {
     let is_name = Path::new(word).extension().is_some_and(|extension| {
         extension.len() > 1 && extension.to_string_lossy().starts_with(char::is_alphabetic)

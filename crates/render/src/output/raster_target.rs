@@ -261,6 +261,7 @@ fn spec(canvas: &Canvas, format: PixelFormat, layout: Layout, layer: RasterLayer
                 name: "255 where a frame shows the wall",
                 unit: "",
             }),
+            nodata: Some(Nodata::Zero),
             ..plain
         },
         RasterLayer::Frames => RasterSpec {

@@ -13,9 +13,13 @@ use crate::camera::projection::Camera;
 use crate::files::xml::{child, children, numbers, parse};
 use roxmltree::Node;
 
-/// Reads the calibration of a sensor, whose name is its id.
+/// Reads the calibration of a sensor, whose name is its id, or the one of a file of its own, as
+/// "Camera Calibration" saves it.
 pub fn read(text: &str, name: Option<&str>) -> Result<Camera, ParseError> {
     let document = parse(text).map_err(ParseError::new)?;
+    if document.root_element().has_tag_name("calibration") {
+        return camera(document.root_element());
+    }
     let chunks = children(document.root_element(), "chunk");
     let sensors = chunks.filter_map(|chunk| child(chunk, "sensors"));
     let sensors = sensors.flat_map(|sensors| children(sensors, "sensor"));
@@ -56,7 +60,9 @@ fn camera(calibration: Node) -> Result<Camera, ParseError> {
     }
     let [k1, k2, k3, k4] = [value("k1")?, value("k2")?, value("k3")?, value("k4")?];
     let [p1, p2] = [value("p2")?, value("p1")?];
-    let lens: Lens = match calibration.attribute("type").unwrap_or("frame") {
+    let projection = child(calibration, "projection").and_then(|node| node.text());
+    let model = calibration.attribute("type").or(projection);
+    let lens: Lens = match model.map_or("frame", str::trim) {
         "frame" if k4 != 0.0 => {
             return Err(ParseError::new(format!(
                 "`k4` is {k4}; it is not supported: optimise the cameras without it"
@@ -85,7 +91,11 @@ fn camera(calibration: Node) -> Result<Camera, ParseError> {
 /// Width and height of the pictures, pixels.
 fn size(calibration: Node) -> Result<[u32; 2], ParseError> {
     let resolution = child(calibration, "resolution");
-    let side = |name: &str| resolution.and_then(|node| node.attribute(name)?.parse().ok());
+    // A file of its own has elements.
+    let side = |name: &'static str| match resolution {
+        Some(node) => node.attribute(name)?.parse().ok(),
+        None => child(calibration, name)?.text()?.trim().parse().ok(),
+    };
     match (side("width"), side("height")) {
         (Some(width), Some(height)) => Ok([width, height]),
         _ => Err(ParseError::new(
@@ -108,6 +118,18 @@ mod tests {
 </calibration><calibration type="{kind}" class="adjusted"><resolution width="640" height="480"/>
 {parameters}</calibration></sensor></sensors></chunk></document>"#
         )
+    }
+
+    /// A calibration that is saved alone is that of the sensor.
+    #[test]
+    fn a_calibration_of_its_own_is_read() {
+        let numbers = "<f>500</f><cx>3</cx><cy>-2</cy><k1>-0.1</k1>";
+        let alone = format!(
+            "<calibration><projection>frame</projection><width>640</width><height>480</height>\
+             {numbers}</calibration>"
+        );
+        let read = |text: &str| read_camera("cameras.xml", text, None).unwrap();
+        assert_eq!(read(&alone), read(&file("frame", numbers)));
     }
 
     fn pixel(kind: &str, parameters: &str, point: [f64; 3]) -> [f64; 2] {

@@ -76,10 +76,17 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
+/// Keys that every camera has.
+const KEYS: [&str; 7] = ["model", "width", "height", "fx", "fy", "cx", "cy"];
+
 /// True for an object with one of the keys that every camera has.
 pub fn is_native(tree: &Value) -> bool {
-    let keys = ["model", "width", "height", "fx", "fy", "cx", "cy"];
-    keys.iter().any(|key| tree.get(key).is_some())
+    KEYS.iter().any(|key| tree.get(key).is_some())
+}
+
+/// True for an object with all of the keys that every camera has.
+pub fn has_all_keys(tree: &Value) -> bool {
+    KEYS.iter().all(|key| tree.get(key).is_some())
 }
 
 /// Reads the file as JSON.

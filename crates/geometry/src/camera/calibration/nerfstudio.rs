@@ -5,6 +5,7 @@
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;
+use super::picture_size::PictureSize;
 use super::selection::select_camera;
 use super::value_tree::{number, pixels, text_entry};
 use crate::camera::lens::Lens;
@@ -26,7 +27,11 @@ pub fn is_transforms(tree: &Value) -> bool {
 /// Without any `fl_x`, the angles of view `camera_angle_x` and `camera_angle_y` (radians) give the
 /// focal lengths, the size may be that of the frames, and the principal point is the middle of the
 /// picture unless it is given.
-pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
+pub fn read(
+    tree: &Value,
+    name: Option<&str>,
+    picture_size: PictureSize,
+) -> Result<Camera, ParseError> {
     if tree.get("fl_x").is_some() {
         return camera(tree, tree);
     }
@@ -41,7 +46,7 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
         })
         .collect();
     if own.is_empty() {
-        return camera_of_angles(tree);
+        return camera_of_angles(tree, picture_size);
     }
     // Identical cameras of all frames count as one.
     let (_, first) = &own[0];
@@ -73,14 +78,14 @@ fn camera(own: &Value, tree: &Value) -> Result<Camera, ParseError> {
 }
 
 /// The camera of a file that gives its angles of view.
-fn camera_of_angles(tree: &Value) -> Result<Camera, ParseError> {
+fn camera_of_angles(tree: &Value, picture_size: PictureSize) -> Result<Camera, ParseError> {
     if tree.get("camera_angle_x").is_none() {
         return Err(ParseError::new(
             "there is no `fl_x`; the focal lengths in pixels must be given as fl_x and fl_y, or \
              the angle of view as camera_angle_x in radians",
         ));
     }
-    let [width, height] = size_of_frames(tree)?;
+    let [width, height] = size_of_frames(tree, picture_size)?;
     let [middle_x, middle_y] = [width, height].map(|side| 0.5 * f64::from(side));
     let fx = focal_px(tree, "camera_angle_x", middle_x)?;
     let fy = match tree.get("camera_angle_y") {
@@ -108,11 +113,19 @@ fn focal_px(tree: &Value, name: &str, half_px: f64) -> Result<f64, ParseError> {
     )))
 }
 
-/// Width and height of the pictures, pixels: those of the file, or those that all frames share.
-fn size_of_frames(tree: &Value) -> Result<[u32; 2], ParseError> {
+/// Width and height of the pictures, pixels: those of the file, those that all frames share, or
+/// those of the pictures themselves.
+fn size_of_frames(tree: &Value, picture_size: PictureSize) -> Result<[u32; 2], ParseError> {
     let size = |of: &Value| Ok([pixels(of, &["w"])?, pixels(of, &["h"])?]);
     let frames = tree.get("frames").and_then(Value::as_array);
     let mut frames = frames.into_iter().flatten();
+    let has_size = |of: &Value| of.get("w").is_some() || of.get("h").is_some();
+    if !has_size(tree)
+        && !frames.clone().any(has_size)
+        && let Some(size) = picture_size()
+    {
+        return Ok(size);
+    }
     let Some(first) = frames.next().filter(|_| tree.get("w").is_none()) else {
         return size(tree);
     };

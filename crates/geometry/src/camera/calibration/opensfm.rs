@@ -18,6 +18,15 @@ pub fn is_reconstruction(tree: &Value) -> bool {
     !parts.is_empty() && parts.iter().all(|part| part.get("cameras").is_some())
 }
 
+/// True for cameras by name, each with a `projection_type`: OpenSfM's `camera_models.json`, the
+/// `cameras.json` of OpenDroneMap.
+pub fn is_camera_models(tree: &Value) -> bool {
+    tree.as_object().is_some_and(|cameras| {
+        let mut each = cameras.values();
+        !cameras.is_empty() && each.all(|camera| camera.get("projection_type").is_some())
+    })
+}
+
 /// Reads `projection_type`, `width`, `height` and the parameters of a camera. Its name is its key.
 pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
     let parts = tree.as_array().map(Vec::as_slice).unwrap_or_default();
@@ -28,7 +37,12 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
             parts.len()
         )));
     };
-    let cameras = needed(part, "cameras")?.as_object().into_iter().flatten();
+    named_camera(needed(part, "cameras")?, name)
+}
+
+/// Reads the camera of that name of [`is_camera_models`].
+pub fn named_camera(cameras: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
+    let cameras = cameras.as_object().into_iter().flatten();
     let cameras = cameras.map(|(name, camera)| (name.clone(), camera));
     camera(select_camera(cameras.collect(), name)?)
 }

@@ -5,13 +5,14 @@ use super::picture_size::PictureSize;
 use super::unknown::unknown_calibration;
 use super::{
     basalt, bundler, camodocal, colmap, colmap_binary, gyroflow, kalibr, meshroom, metashape,
-    native, nerfstudio, ocamcalib, opencv, openmvg, opensfm, orbslam, pix4d, realitycapture,
-    recorded, value_tree,
+    native, nerfstudio, ocamcalib, opencv, opencv_xml, openmvg, opensfm, orbslam, pix4d,
+    realitycapture, recorded, value_tree,
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
 use crate::files::{BinaryFile, decode_text, read_regular};
 use crate::recordings::is_recording;
+use serde_json::Value;
 use std::path::Path;
 
 /// Smallest width and height of an image, pixels.
@@ -118,27 +119,34 @@ fn parse(
         "csv" if realitycapture::is_table(text) => realitycapture::read(text, name, size),
         "cam" if pix4d::is_cam(text) => pix4d::read_cam(text, name, size),
         "out" | "csv" | "cam" => Err(unknown_calibration("")),
-        "toml" => native::read_toml(text),
+        "toml" => match toml::from_str::<Value>(text) {
+            Ok(tree) if is_of_others(&tree) => opencv::read(&tree, size),
+            _ => native::read_toml(text),
+        },
         "xml" if !text.contains("<opencv_storage") => metashape::read(text, name),
-        "xml" => Err(ParseError::new(
-            "OpenCV's XML is not supported; save the calibration as YAML (a name that ends in \
-             .yml)",
-        )),
+        "xml" => opencv::read(&opencv_xml::parse_storage(text)?, size),
         _ if extension != "json" && !text.trim_start().starts_with(['{', '[']) => {
             Err(unknown_calibration(""))
         }
         _ => match value_tree::parse_json(text) {
-            Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
+            Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name, size),
             Ok(tree) if gyroflow::is_profile(&tree) => gyroflow::read(&tree),
             Ok(tree) if opensfm::is_reconstruction(&tree) => opensfm::read(&tree, name),
+            Ok(tree) if opensfm::is_camera_models(&tree) => opensfm::named_camera(&tree, name),
             Ok(tree) if openmvg::is_sfm_data(&tree) => openmvg::read(&tree, name),
             Ok(tree) if meshroom::is_sfm(&tree) => meshroom::read(&tree, name),
             Ok(tree) if basalt::is_basalt(&tree) => basalt::read(&tree, name),
-            Ok(tree) if opencv::has_matrix(&tree) => opencv::read(&tree, size),
+            Ok(tree) if is_of_others(&tree) => opencv::read(&tree, size),
             Ok(tree) if !native::is_native(&tree) => Err(unknown_calibration("")),
             _ => native::read_json(text),
         },
     }
+}
+
+/// True for the camera of another program: its numbers have other names than in this program's own
+/// files, or the model has none.
+fn is_of_others(tree: &Value) -> bool {
+    opencv::has_camera(tree) && !native::has_all_keys(tree)
 }
 
 /// Rejects impossible camera parameters.

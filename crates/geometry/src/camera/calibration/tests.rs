@@ -309,11 +309,7 @@ fn bad_files_say_where_and_what() {
             "cam0: {camera_model: bal}\n".to_owned(),
             "\"bal\" is not supported",
         ),
-        (
-            "c.xml",
-            "<opencv_storage>".to_owned(),
-            "save the calibration as YAML",
-        ),
+        ("c.xml", "<opencv_storage>".to_owned(), "is no valid XML"),
         ("c.txt", String::new(), "holds no camera"),
         (
             "c.txt",

@@ -3,11 +3,12 @@
 use super::error::{ParseError, ParseErrorKind};
 
 /// The files that can be read.
-const KNOWN: &str = "known are camera.json and camera.toml of this program, YAML of OpenCV, ROS \
-                     (camera_info), Kalibr (camchain), camodocal and ORB-SLAM, JSON of OpenCV, \
-                     COLMAP's cameras.txt and cameras.bin, nerfstudio's transforms.json, the files \
-                     of OpenSfM, OpenMVG, Meshroom, Metashape, Bundler, RealityCapture and Pix4D, \
-                     Basalt's JSON, Gyroflow's lens profiles and OCamCalib's calib_results.txt; or \
+const KNOWN: &str = "known are camera.json and camera.toml of this program, YAML of ROS \
+                     (camera_info), Kalibr (camchain), camodocal and ORB-SLAM, YAML, XML and JSON \
+                     of OpenCV, any of these with fx, fy, cx and cy, COLMAP's cameras.txt and \
+                     cameras.bin, nerfstudio's transforms.json, the files of OpenSfM, OpenMVG, \
+                     Meshroom, Metashape, Bundler, RealityCapture and Pix4D, Basalt's JSON, \
+                     Gyroflow's lens profiles and OCamCalib's calib_results.txt; or \
                      write a camera.json";
 
 /// The error that names the known files; `missing`: an explanation in brackets, or nothing.

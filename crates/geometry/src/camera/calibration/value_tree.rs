@@ -4,9 +4,16 @@ use super::error::ParseError;
 use serde_json::Value;
 
 /// Parses a YAML file. OpenCV's files begin with `%YAML:1.0`, which YAML does not allow, and mark
-/// matrices with a tag of their own; both are removed first.
+/// matrices with a tag of their own; both are removed first. Of several documents, as `rostopic
+/// echo` prints them, the first counts.
 pub fn parse_yaml(text: &str) -> Result<Value, ParseError> {
-    let lines = text.lines().map(|line| {
+    let mut has_content = false;
+    let lines = text.lines().take_while(|line| {
+        let is_end = line.trim_end() == "---" && has_content;
+        has_content |= !line.trim().is_empty() && !line.starts_with(['%', '#', '-']);
+        !is_end
+    });
+    let lines = lines.map(|line| {
         let line = if line.starts_with("%YAML") { "" } else { line };
         line.replace("!!opencv-matrix", "")
     });

@@ -16,8 +16,8 @@ pub(super) struct Columns {
     pub name: Option<usize>,
     /// The column of times, or its two.
     pub time: Option<TimeColumn>,
-    /// The columns `tx`, `ty`, `tz`.
-    pub translation: [usize; 3],
+    /// The columns `tx`, `ty`, `tz`, and the metres of a unit of each.
+    pub translation: [(usize, f64); 3],
     /// The columns of the rotation.
     pub rotation: RotationColumns,
 }
@@ -26,6 +26,8 @@ pub(super) struct Columns {
 pub(super) enum RotationColumns {
     /// `qx`, `qy`, `qz`, `qw`.
     Quaternion([usize; 4]),
+    /// The rows of a matrix.
+    Matrix([[usize; 3]; 3]),
     /// Angles about x, y and z with their units.
     Angles([(usize, AngleUnit); 3], EulerSequence),
 }
@@ -56,7 +58,7 @@ impl Columns {
         Ok(Self {
             name: titles.find(PoseColumn::Frame)?,
             time: titles.find_time()?,
-            translation: titles.need(PoseColumn::TRANSLATION)?,
+            translation: titles.find_translation()?,
             rotation: titles.find_rotation(options)?,
         })
     }
@@ -129,12 +131,50 @@ impl Titles<'_> {
         Ok(indices)
     }
 
+    /// The columns of a translation: by their names, or the last of a matrix of three rows.
+    fn find_translation(&self) -> Result<[(usize, f64); 3], String> {
+        if self.find(PoseColumn::Tx)?.is_none()
+            && let Some(indices) = self.matrix_columns([[3]; 3])
+        {
+            return Ok(indices.map(|[index]| (index, 1.0)));
+        }
+        let mut columns = [(0, 1.0); 3];
+        let indices = self.need(PoseColumn::TRANSLATION)?;
+        for ((column, index), name) in columns.iter_mut().zip(indices).zip(PoseColumn::TRANSLATION)
+        {
+            let own = self.titles[index].length_unit_m();
+            let is_mapped = self.map.contains_key(&name);
+            *column = (index, own.filter(|_| !is_mapped).unwrap_or(1.0));
+        }
+        Ok(columns)
+    }
+
+    /// The indices of entries of a matrix, row by row, if their titles name them all; `wanted` are
+    /// the columns of each row, from 0.
+    fn matrix_columns<const N: usize>(&self, wanted: [[usize; N]; 3]) -> Option<[[usize; N]; 3]> {
+        let places: Vec<_> = self.titles.iter().map(Title::matrix_place).collect();
+        let first = if places.contains(&Some([0, 0])) { 0 } else { 1 };
+        let mut indices = [[0; N]; 3];
+        for (row, (found, columns)) in indices.iter_mut().zip(wanted).enumerate() {
+            for (index, column) in found.iter_mut().zip(columns) {
+                let place = Some([row + first, column + first]);
+                *index = places.iter().position(|found| *found == place)?;
+            }
+        }
+        Some(indices)
+    }
+
     /// The columns of a quaternion, or of angles whose order of rotations is given.
     fn find_rotation(&self, options: &PoseFileOptions) -> Result<RotationColumns, String> {
         let has_column = |column| Ok::<_, String>(self.find(column)?.is_some());
         let Some(sequence) = options.euler else {
             let has_angle = has_column(PoseColumn::Rx)? && has_column(PoseColumn::Ry)?;
-            if has_angle && !has_column(PoseColumn::Qx)? && !has_column(PoseColumn::Qw)? {
+            let has_quaternion = has_column(PoseColumn::Qx)? || has_column(PoseColumn::Qw)?;
+            let matrix = self.matrix_columns([[0, 1, 2]; 3]);
+            if let Some(matrix) = matrix.filter(|_| !has_angle && !has_quaternion) {
+                return Ok(RotationColumns::Matrix(matrix));
+            }
+            if has_angle && !has_quaternion {
                 return Err(self.unknown_order(options.angle_unit));
             }
             return self
@@ -184,7 +224,20 @@ impl Titles<'_> {
 
     fn find_time(&self) -> Result<Option<TimeColumn>, String> {
         let position = |is: fn(&Title) -> bool| self.titles.iter().position(is);
-        if let Some(index) = self.find(PoseColumn::TimeS)? {
+        let stamp = self.find(PoseColumn::TimeS)?;
+        let is_best = |index: usize| self.titles[index].rank(PoseColumn::TimeS) == Some(0);
+        let is_given = self.map.contains_key(&PoseColumn::TimeS);
+        let parts = (
+            position(Title::is_stamp_seconds),
+            position(Title::is_stamp_nanoseconds),
+        );
+        if let (Some(seconds), Some(nanoseconds)) = parts
+            && !is_given
+            && !stamp.is_some_and(is_best)
+        {
+            return Ok(Some(TimeColumn::Parts(seconds, nanoseconds)));
+        }
+        if let Some(index) = stamp {
             return Ok(Some(TimeColumn::One(index, None)));
         }
         for (column, unit) in [
@@ -198,14 +251,7 @@ impl Titles<'_> {
         if let Some(index) = self.find(PoseColumn::TimeNs)? {
             return Ok(Some(TimeColumn::Nanoseconds(index)));
         }
-        let parts = (
-            position(Title::is_stamp_seconds),
-            position(Title::is_stamp_nanoseconds),
-        );
-        Ok(match parts {
-            (Some(seconds), Some(nanoseconds)) => Some(TimeColumn::Parts(seconds, nanoseconds)),
-            _ => None,
-        })
+        Ok(None)
     }
 
     fn missing(&self, column: PoseColumn) -> String {

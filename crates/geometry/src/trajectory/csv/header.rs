@@ -3,6 +3,7 @@
 use super::pose_column::{ColumnMap, PoseColumn};
 use super::table::{records, separator_or_blank, split};
 use super::title::Title;
+use crate::trajectory::float::float;
 use crate::trajectory::text;
 
 /// The header of a table.
@@ -19,14 +20,21 @@ pub(crate) struct Header<'a> {
 /// Smallest number of columns of poses that a header names.
 const MIN_POSE_COLUMNS: usize = 2;
 
+/// Columns of a rotation matrix.
+const MATRIX_COLUMNS: usize = 9;
+
 impl<'a> Header<'a> {
     /// Finds the header of a table of poses: its first line with content after a `sep=;`, or the
-    /// comment before it, if that has as many columns. `None` if neither names columns of poses, or
-    /// if the comment is that of TUM: a time, a translation and a quaternion, separated by blanks.
+    /// comment before it, if that has as many columns, or a line below titles. `None` if none of
+    /// them names columns of poses, or if the comment is that of TUM: a time, a translation and a
+    /// quaternion, separated by blanks.
     pub fn find(text: &'a str, map: &ColumnMap) -> Option<Self> {
         let first = Self::first_line(text)?;
         if is_header(first.line, first.separator, map) {
             return Some(first);
+        }
+        if let Some(below) = Self::below_titles(text, map) {
+            return Some(below);
         }
         let comments = text.lines().enumerate().take(first.number - 1);
         let (index, comment) = comments
@@ -42,6 +50,31 @@ impl<'a> Header<'a> {
             line,
             separator,
         })
+    }
+
+    /// The header below lines of other words, as titles of a spreadsheet: the first that names
+    /// columns of poses, if no row of numbers precedes it and a row of as many columns follows.
+    fn below_titles(text: &'a str, map: &ColumnMap) -> Option<Self> {
+        let mut lines = text::lines(text).peekable();
+        while let Some((number, line)) = lines.next() {
+            let separator = separator_or_blank(line);
+            let cells = |line| split(line, separator).ok();
+            let is_number = |cell: &&str| float(cell).is_some();
+            let record = cells(line)?;
+            if 2 * record.iter().filter(is_number).count() > record.len() {
+                return None;
+            }
+            if is_header(line, separator, map) {
+                let next = lines.peek().and_then(|(_, line)| cells(line));
+                let fits = next.is_some_and(|next| next.len() == record.len());
+                return fits.then_some(Self {
+                    number,
+                    line,
+                    separator,
+                });
+            }
+        }
+        None
     }
 
     /// The first line with content after a `sep=;`, with the separator that it or that line has.
@@ -75,7 +108,9 @@ fn is_header(line: &str, separator: u8, map: &ColumnMap) -> bool {
         let mut pose = (PoseColumn::TRANSLATION.into_iter()).chain(PoseColumn::QUATERNION);
         map.values().any(|name| name == text) || pose.any(|column| title.rank(column).is_some())
     };
+    let is_matrix = |text: &&str| Title::of(text).matrix_place().is_some();
     record.iter().filter(is_pose).count() >= MIN_POSE_COLUMNS
+        || record.iter().filter(is_matrix).count() >= MATRIX_COLUMNS
 }
 
 /// True if a line of names separated by blanks has columns of a pose where TUM has the time, or a

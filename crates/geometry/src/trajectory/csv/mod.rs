@@ -30,6 +30,6 @@ pub(super) use columns::FORM;
 pub(super) use header::Header;
 pub use pose_column::{ColumnMap, PoseColumn};
 pub use reader::PICTURE_EXTENSIONS;
-pub(super) use reader::parse;
+pub(super) use reader::{is_picture_name, parse};
 pub(super) use table::{separator, split};
 pub use writer::format;

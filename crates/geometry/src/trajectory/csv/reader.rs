@@ -3,13 +3,16 @@
 use super::cells::name_from_cell;
 use super::columns::{Columns, FORM, RotationColumns, TimeColumn};
 use super::header::Header;
+use super::pose_column::PoseColumn;
 use super::table::split;
+use super::title::is_length_unit;
 use crate::trajectory::entry_list::{EntryList, ParsedPoses};
 use crate::trajectory::error::PoseError;
 use crate::trajectory::nanoseconds::from_nanoseconds;
 use crate::trajectory::pose::Pose;
 use crate::trajectory::pose_entry::PoseEntry;
 use crate::trajectory::pose_options::PoseFileOptions;
+use crate::trajectory::rigid;
 use crate::trajectory::text;
 use crate::trajectory::time_unit::TimeUnit;
 use csv::StringRecord;
@@ -30,22 +33,29 @@ pub(crate) fn parse(
         return Ok(ParsedPoses::default());
     };
     let fail = |number: usize| move |what: String| PoseError::line(path, number, what);
-    let titles = split(header.line, header.separator).map_err(fail(header.number))?;
+    let mut titles = split(header.line, header.separator).map_err(fail(header.number))?;
+    let mut records = header.records(text).peekable();
+    let row = |line| split(line, header.separator).ok();
+    if let Some(units) = records.peek().and_then(|(_, line)| row(line))
+        && is_row_of_units(&units)
+    {
+        titles = with_units(&titles, &units);
+        records.next();
+    }
     let mut columns = Columns::of(&titles, options).map_err(fail(header.number))?;
     if columns.name.is_none() {
-        let first = header.records(text).next();
-        let first = first.and_then(|(_, line)| split(line, header.separator).ok());
+        let first = records.peek().and_then(|(_, line)| row(line));
         columns.name = first.as_ref().and_then(picture_column);
     }
     let row = RowReader {
         columns,
-        count: titles.len(),
+        count: filled(&titles),
         separator: header.separator,
         time_unit: options.time_unit,
     };
     let mut entries = EntryList::new(options.duplicate_times);
     let mut names = text::Names::default();
-    for (number, line) in header.records(text) {
+    for (number, line) in records {
         row.read(line)
             .and_then(|entry| {
                 entry
@@ -62,19 +72,51 @@ pub(crate) fn parse(
 /// The only column with the name of a picture, whatever its title (`Bild`, `Photo ID`): without it,
 /// rows in another order than the frames would be taken for theirs.
 fn picture_column(record: &StringRecord) -> Option<usize> {
-    let is_picture = |cell: &str| {
-        let extension = cell.rsplit_once('.').map(|(_, extension)| extension);
-        let extension = extension.map(str::to_ascii_lowercase);
-        extension.is_some_and(|extension| PICTURE_EXTENSIONS.contains(&extension.as_str()))
-    };
-    let mut found = (0..record.len()).filter(|k| record.get(*k).is_some_and(is_picture));
+    let mut found = (0..record.len()).filter(|k| record.get(*k).is_some_and(is_picture_name));
     found.next().filter(|_| found.next().is_none())
+}
+
+/// True for a word that ends as the name of a picture does.
+pub(crate) fn is_picture_name(word: &str) -> bool {
+    let extension = word.rsplit_once('.').map(|(_, extension)| extension);
+    let extension = extension.map(str::to_ascii_lowercase);
+    extension.is_some_and(|extension| PICTURE_EXTENSIONS.contains(&extension.as_str()))
+}
+
+/// Number of the cells of a record up to the last that is not empty.
+fn filled(record: &StringRecord) -> usize {
+    let cells = record.iter().enumerate();
+    let last = cells.filter(|(_, cell)| !cell.is_empty()).last();
+    last.map_or(0, |(k, _)| k + 1)
+}
+
+/// True for the row below the titles that names the units of some columns, at least those of a
+/// translation, and holds no number.
+fn is_row_of_units(record: &StringRecord) -> bool {
+    let is_number = |cell: &str| cell.contains(|c: char| c.is_ascii_digit());
+    let lengths = record.iter().filter(|cell| is_length_unit(cell));
+    !record.iter().any(is_number) && lengths.count() >= PoseColumn::TRANSLATION.len()
+}
+
+/// The titles, each with the unit below it.
+fn with_units(titles: &StringRecord, units: &StringRecord) -> StringRecord {
+    let unit = |k: usize| {
+        units
+            .get(k)
+            .map(|unit| unit.trim_matches(['[', ']', '(', ')']))
+    };
+    let titles = titles.iter().enumerate();
+    let joined = titles.map(|(k, title)| match unit(k) {
+        None | Some("") => title.to_owned(),
+        Some(unit) => format!("{title} [{unit}]"),
+    });
+    joined.collect::<Vec<_>>().into()
 }
 
 /// A reader of the rows of a table.
 struct RowReader {
     columns: Columns,
-    /// Number of columns.
+    /// Number of columns up to the last that has a title.
     count: usize,
     separator: u8,
     /// Unit of the times whose column does not tell.
@@ -85,7 +127,8 @@ impl RowReader {
     /// Reads the pose of a row.
     fn read(&self, line: &str) -> Result<PoseEntry, String> {
         let record = split(line, self.separator)?;
-        if record.len() != self.count {
+        let most = filled(&record).max(self.count);
+        if record.len() < self.count || most > self.count {
             let remedy = if self.separator == b',' && record.len() > self.count {
                 "; where numbers have decimal commas, semicolons or tabs must separate them"
             } else {
@@ -98,9 +141,19 @@ impl RowReader {
             ));
         }
         let number = |column| text::number(&self.number_in(&record, column), FORM);
+        let metres = |(column, unit_m): (usize, f64)| Ok::<_, String>(unit_m * number(column)?);
         let [tx, ty, tz] = self.columns.translation;
-        let position = Vector3::new(number(tx)?, number(ty)?, number(tz)?);
+        let position = Vector3::new(metres(tx)?, metres(ty)?, metres(tz)?);
         let rotation = match self.columns.rotation {
+            RotationColumns::Matrix(rows) => {
+                let mut matrix = [[0.0; 4]; 3];
+                for (row, columns) in matrix.iter_mut().zip(rows) {
+                    for (value, column) in row.iter_mut().zip(columns) {
+                        *value = number(column)?;
+                    }
+                }
+                rigid::from_rows(&matrix)?.r_wc
+            }
             RotationColumns::Quaternion([qx, qy, qz, qw]) => {
                 let wxyz = [number(qw)?, number(qx)?, number(qy)?, number(qz)?];
                 text::rotation(wxyz, "as the columns' names say")?
@@ -147,7 +200,8 @@ impl RowReader {
 
     /// The number in a column, with a decimal point.
     fn number_in<'a>(&self, record: &'a StringRecord, column: usize) -> Cow<'a, str> {
-        text::with_decimal_point(record.get(column).unwrap_or_default(), self.separator)
+        let cell = record.get(column).unwrap_or_default();
+        text::with_decimal_point(cell.trim_matches('\''), self.separator)
     }
 }
 
@@ -263,6 +317,43 @@ mod tests {
             said.contains("no column `ry`") && said.contains("columns = { ry"),
             "{said}"
         );
+    }
+
+    /// Titles, rules and units around a table that people have edited.
+    #[test]
+    fn tables_that_people_have_edited_are_read() {
+        let read = |text: &str| parse(Path::new("p.csv"), text).unwrap();
+        let plain = read("tx,ty,tz,qx,qy,qz,qw\n0.5,-1,2,0,0,0,1\n");
+        for text in [
+            "Survey of May\n\nmade by hand,,\ntx,ty,tz,qx,qy,qz,qw\n0.5,-1,2,0,0,0,1\n",
+            "tx,ty,tz,qx,qy,qz,qw\nm,m,m,-,-,-,-\n0.5,-1,2,0,0,0,1\n",
+            "tx,ty,tz,qx,qy,qz,qw\n[cm],[cm],[cm],,,,\n50,-100,200,0,0,0,1\n",
+            "x_mm,y [mm],Z (mm),qx,qy,qz,qw\n500,-1000,2000,0,0,0,1\n",
+            "tx,ty,tz,qx,qy,qz,qw\n0.5,-1,2,0,0,0,1,\n",
+            "tx,ty,tz,qx,qy,qz,qw,,,\n0.5,-1,2,0,0,0,1\n",
+            "'tx','ty','tz','qx','qy','qz','qw'\n'0.5','-1','2','0','0','0','1'\n",
+            "tx,ty,tz,qx,qy,qz,qw\n\"0,5\",\"-1,0\",\"2,00\",0,0,0,1\n",
+            "| tx | ty | tz | qx | qy | qz | qw |\n|---|---:|:--|---|---|---|---|\n\
+             | 0.5 | -1 | 2 | 0 | 0 | 0 | 1 |\n",
+            "r11,r12,r13,tx,r21,r22,r23,ty,r31,r32,r33,tz\n1,0,0,0.5,0,1,0,-1,0,0,1,2\n",
+            "r11,r12,r13,t1,r21,r22,r23,t2,r31,r32,r33,t3\n1,0,0,0.5,0,1,0,-1,0,0,1,2\n",
+            "m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23\n1,0,0,0.5,0,1,0,-1,0,0,1,2\n",
+        ] {
+            assert_eq!(read(text), plain, "{text}");
+        }
+        let feet = read("x [ft],y [ft],z [ft],qx,qy,qz,qw\n10,0,0,0,0,0,1\n");
+        assert!((feet[0].pose.t_wc.x - 3.048).abs() < 1e-12);
+    }
+
+    /// The stamp of a message is the camera's, the column `time` that of the recording.
+    #[test]
+    fn a_stamp_in_two_parts_precedes_other_times() {
+        let text = "time,.header.stamp.secs,.header.stamp.nsecs,.pose.position.x,\
+            .pose.position.y,.pose.position.z,.pose.orientation.x,.pose.orientation.y,\
+            .pose.orientation.z,.pose.orientation.w\n\
+            2026/11/25/08:47:38.6,1795596458,500000000,0,0,0,0,0,0,1\n";
+        let read = parse(Path::new("p.csv"), text).unwrap();
+        assert_eq!(read[0].time_s, Some(1795596458.5));
     }
 
     /// Thousands, decimal commas, empty cells and rows, blanks and dates.

@@ -23,8 +23,10 @@ pub(super) fn records(text: &str, separator: u8) -> impl Iterator<Item = (usize,
             let (record, after) = rest.split_at(end);
             rest = after;
             let record = record.trim();
-            // Spreadsheets write rows of separators alone.
-            let is_empty = record.bytes().all(|byte| byte == separator || byte == b' ');
+            // Spreadsheets write rows of separators alone, Markdown a rule below the titles.
+            let is_rule = |byte| separator == b'|' && b"-:".contains(&byte);
+            let is_blank = |byte| byte == separator || byte == b' ' || is_rule(byte);
+            let is_empty = record.bytes().all(is_blank);
             if !(is_empty || is_comment) {
                 return Some((first, record));
             }
@@ -55,7 +57,7 @@ fn is_open(record: &str, separator: u8) -> bool {
 /// The separator of a table's columns, from its first line.
 pub(crate) fn separator(header: &str) -> u8 {
     let is_there = |separator: &u8| header.as_bytes().contains(separator);
-    [b'\t', b';', b',']
+    [b'\t', b';', b',', b'|']
         .into_iter()
         .find(is_there)
         .unwrap_or(b',')
@@ -63,7 +65,7 @@ pub(crate) fn separator(header: &str) -> u8 {
 
 /// The separator of a table's columns, from its first line, in which blanks may separate, too.
 pub(super) fn separator_or_blank(header: &str) -> u8 {
-    let is_blank = !header.contains(['\t', ';', ',']) && header.contains(' ');
+    let is_blank = !header.contains(['\t', ';', ',', '|']) && header.contains(' ');
     if is_blank { b' ' } else { separator(header) }
 }
 

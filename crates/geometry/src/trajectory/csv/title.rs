@@ -43,7 +43,7 @@ pub(super) struct Title {
 impl Title {
     /// The title that a cell of a header holds, such as `p_RS_R_x [m]` or `%time`.
     pub fn of(text: &str) -> Self {
-        let text = text.trim().to_lowercase();
+        let text = text.trim().trim_matches(['\'', '"']).to_lowercase();
         let in_brackets = |open, close| text.strip_suffix(close)?.rsplit_once(open);
         let (name, unit) = in_brackets('[', ']')
             .or_else(|| in_brackets('(', ')'))
@@ -131,16 +131,49 @@ impl Title {
     }
 
     fn rank_of_translation(&self, axis: &str) -> Option<usize> {
-        if !["", "m", "metres", "meters"].contains(&self.unit.as_str()) {
+        if !self.unit.is_empty() && !is_length_unit(&self.unit) {
             return None;
         }
-        let name = self.name.strip_suffix("_m").unwrap_or(&self.name);
+        let name = self.name_without_length();
         if name == axis || name.strip_prefix('t') == Some(axis) {
             return Some(0);
         }
         let is_other =
-            name.strip_prefix('p') == Some(axis) || self.is_axis_of(axis, 'p', TRANSLATIONS);
+            name.strip_prefix('p') == Some(axis) || is_axis_of(name, axis, 'p', TRANSLATIONS);
+        // The last column of a matrix, counted from 1.
+        let is_other = is_other || matches!((name, axis), ("t1", "x") | ("t2", "y") | ("t3", "z"));
         is_other.then_some(1)
+    }
+
+    /// The name without the unit of a length at its end.
+    fn name_without_length(&self) -> &str {
+        let parts = self.name.rsplit_once('_');
+        let parts = parts.filter(|(_, unit)| self.unit.is_empty() && is_length_unit(unit));
+        parts.map_or(self.name.as_str(), |(name, _)| name)
+    }
+
+    /// Metres of the unit of a length, which brackets or the last word of the name tell.
+    pub fn length_unit_m(&self) -> Option<f64> {
+        let last = self.name.rsplit_once('_').map_or("", |(_, last)| last);
+        length_unit_m(if self.unit.is_empty() {
+            last
+        } else {
+            &self.unit
+        })
+    }
+
+    /// Row and column of an entry of a matrix, as `r11`, `R_0_2` or `m03` name it.
+    pub fn matrix_place(&self) -> Option<[usize; 2]> {
+        let rest = self
+            .name
+            .strip_prefix("rot")
+            .or(self.name.strip_prefix(['r', 'm', 't']))?;
+        let digits: String = rest.chars().filter(|c| *c != '_').collect();
+        let [row, column] = digits.as_bytes() else {
+            return None;
+        };
+        let digit = |byte: &u8| byte.is_ascii_digit().then(|| usize::from(byte - b'0'));
+        Some([digit(row)?, digit(column)?])
     }
 
     fn rank_of_rotation(&self, axis: &str) -> Option<usize> {
@@ -150,7 +183,7 @@ impl Title {
         if self.name.strip_prefix('q') == Some(axis) {
             return Some(0);
         }
-        self.is_axis_of(axis, 'q', ROTATIONS).then_some(1)
+        is_axis_of(&self.name, axis, 'q', ROTATIONS).then_some(1)
     }
 
     /// The rank of an angle about an axis, such as `roll_deg` or `pose.yaw [rad]`.
@@ -160,22 +193,37 @@ impl Title {
         let mut words = self.name.split('_');
         words.any(is_so_called).then_some(0)
     }
+}
 
-    /// True for names like `pose_position_x`, whose last word but one is one of `words`, and for
-    /// names like EuRoC's `p_rs_r_x`, whose first word is `letter`.
-    fn is_axis_of(&self, axis: &str, letter: char, words: &[&str]) -> bool {
-        let Some(rest) = self
-            .name
-            .strip_suffix(axis)
-            .and_then(|rest| rest.strip_suffix('_'))
-        else {
-            return false;
-        };
-        let first = rest.split('_').next();
-        let last = rest.rsplit('_').next();
-        first.is_some_and(|first| first.strip_prefix(letter) == Some(""))
-            || last.is_some_and(|last| words.contains(&last))
-    }
+/// True for names like `pose_position_x`, whose last word but one is one of `words`, and for names
+/// like EuRoC's `p_rs_r_x`, whose first word is `letter`.
+fn is_axis_of(name: &str, axis: &str, letter: char, words: &[&str]) -> bool {
+    let rest = name.strip_suffix(axis);
+    let Some(rest) = rest.and_then(|rest| rest.strip_suffix('_')) else {
+        return false;
+    };
+    let first = rest.split('_').next();
+    let last = rest.rsplit('_').next();
+    first.is_some_and(|first| first.strip_prefix(letter) == Some(""))
+        || last.is_some_and(|last| words.contains(&last))
+}
+
+/// True for the unit of a length, in brackets or not.
+pub(super) fn is_length_unit(word: &str) -> bool {
+    length_unit_m(word.trim_matches(['[', ']', '(', ')'])).is_some()
+}
+
+/// Metres of the unit of a length.
+fn length_unit_m(word: &str) -> Option<f64> {
+    Some(match word.to_lowercase().as_str() {
+        "m" | "metre" | "metres" | "meter" | "meters" => 1.0,
+        "mm" | "millimetres" => 1e-3,
+        "cm" | "centimetres" => 1e-2,
+        "km" | "kilometres" => 1e3,
+        "ft" | "foot" | "feet" => 0.3048,
+        "in" | "inch" | "inches" => 0.0254,
+        _ => return None,
+    })
 }
 
 #[cfg(test)]
@@ -237,7 +285,7 @@ mod tests {
             assert!(Title::of(text).rank(column).is_some(), "{text}");
         }
         for (text, column) in [
-            ("p_RS_R_x [mm]", Tx),
+            ("p_RS_R_x [s]", Tx),
             ("time [ms]", TimeS),
             ("v_RS_R_x [m s^-1]", Tx),
             ("field.twist.linear.x", Tx),
