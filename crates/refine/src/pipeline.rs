@@ -176,13 +176,12 @@ fn run_stages(
             Err(error) => return Err(error),
         };
         let fits = ended.as_ref().is_some_and(fits_light);
-        let has_strays = ended.as_ref().is_none_or(has_many_strays);
-        if readings.are_untried() && (has_strays || !fits) {
+        let is_doubtful = !fits || ended.as_ref().is_none_or(has_many_strays);
+        if is_doubtful && readings.are_untried() {
             readings = compare_readings(setup, session)?;
         }
-        let is_misread = matches!(readings, OtherReadings::Fit(_));
         estimation = match ended {
-            ended if is_misread && !ended.as_ref().is_some_and(is_assessed) => {
+            ended if is_doubtful && is_misread(&readings, ended.as_ref()) => {
                 let frames = ended.map(|ended| ended.state.frames);
                 return unsolved(
                     setup,
@@ -218,8 +217,11 @@ fn run_stages(
         };
         estimation.state.readings = readings.clone();
     }
+    let is_doubtful = has_many_strays(&estimation);
     let mut refined = estimation.refined.ok_or(RefineError::NoOverlap)?;
-    refined.report.readings = readings;
+    if is_doubtful {
+        refined.report.readings = readings;
+    }
     Ok(Outcome::refined(refined))
 }
 
@@ -232,6 +234,18 @@ impl Outcome {
 /// True after the last stage.
 fn is_assessed(ended: &Estimation) -> bool {
     ended.refined.is_some()
+}
+
+/// True if a stage has shown that the survey is read wrongly: no later one will mend it. Another
+/// camera may still be found by a solve for the lens.
+fn is_misread(readings: &OtherReadings, ended: Option<&Estimation>) -> bool {
+    let OtherReadings::Fit(found) = readings else {
+        return false;
+    };
+    ended.is_none_or(|ended| {
+        let is_lens_solved = !ended.state.levels.is_empty();
+        !is_assessed(ended) && (is_lens_solved || !found.is_of_camera)
+    })
 }
 
 /// True if more than a quarter of the frames fit nowhere, or not the others: by so many pairs of

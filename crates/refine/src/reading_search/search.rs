@@ -216,6 +216,7 @@ fn name(mut found: Vec<Found>) -> Option<FittingReadings> {
     let first = named.first()?;
     Some(FittingReadings {
         readings: named.iter().map(|one| one.reading.remedy.clone()).collect(),
+        is_of_camera: named.iter().any(|one| one.reading.changes_camera()),
         fitting: first.fitting,
         given: first.given,
         pairs: first.pairs,

@@ -36,6 +36,8 @@ impl From<Option<FittingReadings>> for OtherReadings {
 pub struct FittingReadings {
     /// The readings, each as it is asked for.
     pub readings: Vec<String>,
+    /// True if one of them is of another camera.
+    pub is_of_camera: bool,
     /// Pairs of neighbouring frames that fit in the first of them.
     pub fitting: usize,
     /// Pairs that fit as given.
@@ -55,6 +57,7 @@ impl FittingReadings {
             given,
             pairs,
             log_odds,
+            ..
         } = self;
         let power = log_odds / std::f64::consts::LN_10;
         let odds = if power < MAX_ODDS_POWER {
@@ -89,6 +92,7 @@ mod tests {
         let sentence = |given| {
             let found = FittingReadings {
                 readings: vec!["a".to_owned(), "b".to_owned()],
+                is_of_camera: false,
                 fitting: 7,
                 given,
                 pairs: 7,
