@@ -72,10 +72,16 @@ const go = async (hash) => {
   await page.evaluate((hash) => (location.hash = hash), hash);
   return told();
 };
+/** Waits until the page is drawn so many times. */
+const drawn = (times) =>
+  page.evaluate(async (times) => {
+    for (let k = 0; k < times; k++) await new Promise(requestAnimationFrame);
+  }, times);
 /** Waits until it is enough, by where you are and were; how fast one walks depends on how fast the page is drawn. */
 const until = async (enough) => {
   for (let k = 0, before = await where(); k < 40; k++) {
     await page.waitForTimeout(500);
+    await drawn(10);
     const now = await where();
     if (enough(now, before)) break;
     before = now;
