@@ -8,9 +8,9 @@ use serde::Serialize;
 
 /// Processor time per frame that does not depend on its size, seconds. Measured, as
 /// [`TIME_PER_PIXEL_S`], on surveys of 320 × 240 to 640 × 480 px on one core of a cloud machine.
-const TIME_PER_FRAME_S: f64 = 0.035;
+const TIME_PER_FRAME_S: f64 = 0.06;
 /// Processor time per pixel of a frame, seconds.
-const TIME_PER_PIXEL_S: f64 = 0.14e-6;
+const TIME_PER_PIXEL_S: f64 = 0.25e-6;
 /// Processor time per frame and cubic degree in which it is searched for, seconds. Measured on
 /// surveys of 320 × 240 px with 1-σ from 5° to 20°; the search is at a resolution of its own, so
 /// that the time does not depend on the size of the frames.
@@ -22,18 +22,27 @@ const TIME_PER_REGISTRATION_S: f64 = 0.02;
 const JOINT_FACTOR: f64 = 15.0;
 /// Processor time of the last solves and the assessment, which come after shards are joined, over
 /// that of a whole refinement.
-pub const JOIN_SHARE: f64 = 0.3;
+pub const JOIN_SHARE: f64 = 0.35;
 /// Memory of a frame's pyramid per pixel, bytes.
 const PYRAMID_BYTES_PER_PIXEL: f64 = 6.0;
-/// Memory of the normal equations per frame, bytes: those of poses and of the wall's shape.
-/// Measured on stretches of 680 to 1,660 frames of 320 × 240 px with twelve a turn.
-const SHAPE_BYTES_PER_FRAME: f64 = 0.1e6;
-/// Memory of a factor of them per frame, bytes; every thread has one while the strengths of the
-/// shape are learned. Measured likewise, on one and two threads.
-const FACTOR_BYTES_PER_FRAME: f64 = 0.3e6;
-/// Memory of the normal equations per frame of the last solve and the assessment, bytes, where the
-/// wall has no shape. Measured likewise.
-const EQUATION_BYTES_PER_FRAME: f64 = 0.2e6;
+/// Memory of refining any survey, bytes. Measured, as the next four, on surveys of 24 to 240 frames
+/// of 320 × 240 and 640 × 480 px.
+const ANY_SURVEY_BYTES: f64 = 10e6;
+/// Memory of each thread, bytes.
+const BYTES_PER_THREAD: f64 = 12e6;
+/// Frames of the longest windows of tracking.
+const WINDOW_FRAMES: f64 = 160.0;
+/// Memory of each of them in each thread, bytes.
+const WINDOW_BYTES_PER_THREAD: f64 = 0.1e6;
+/// Memory of each of their pixels, bytes.
+const WINDOW_BYTES_PER_PIXEL: f64 = 1.0;
+/// Memory per frame that is not its picture's, bytes: equations and observations. Measured, as the
+/// two after it, on up to 12,000 frames of 320 × 240 px with twelve a turn.
+const BYTES_PER_FRAME: f64 = 0.13e6;
+/// Memory of a shard per frame that is not its picture's, bytes.
+const SHARD_BYTES_PER_FRAME: f64 = 0.1e6;
+/// Memory of joining shards per frame that is not its picture's, bytes.
+const JOIN_BYTES_PER_FRAME: f64 = 0.053e6;
 
 /// Rough estimates of time, memory and size.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -100,29 +109,25 @@ fn focal_registrations(survey: &Survey, options: &RefineOptions) -> f64 {
     }
 }
 
-/// Memory of refine on so many threads, bytes, beside what the program takes for any survey.
+/// Memory of refine on so many threads, bytes, beside what the program takes for anything.
 pub fn refine_bytes(survey: &Survey, threads: usize) -> u64 {
     let cache_bytes = RefineOptions::default().cache_bytes;
-    let memory = (cache_bytes, shape_bytes_per_frame(threads));
-    bytes_of_frames(survey, survey.frames.len(), memory)
+    let frames = survey.frames.len();
+    bytes_of_frames(survey, frames, threads, (cache_bytes, BYTES_PER_FRAME))
 }
 
 /// Memory of refining one of so many shards on so many threads, bytes, beside what the program
-/// takes for any survey.
+/// takes for anything.
 pub fn shard_bytes(survey: &Survey, shards: usize, threads: usize) -> u64 {
-    let memory = (SHARD_CACHE_BYTES, shape_bytes_per_frame(threads));
-    bytes_of_frames(survey, shard_frames(survey, shards), memory)
+    let frames = shard_frames(survey, shards);
+    let memory = (SHARD_CACHE_BYTES, SHARD_BYTES_PER_FRAME);
+    bytes_of_frames(survey, frames, threads, memory)
 }
 
-/// Memory of joining shards, bytes, beside what the program takes for any survey.
-pub fn join_bytes(survey: &Survey) -> u64 {
-    let memory = (JOIN_CACHE_BYTES, EQUATION_BYTES_PER_FRAME);
-    bytes_of_frames(survey, survey.frames.len(), memory)
-}
-
-/// Memory of the equations per frame where the wall has a shape, bytes.
-fn shape_bytes_per_frame(threads: usize) -> f64 {
-    SHAPE_BYTES_PER_FRAME + threads as f64 * FACTOR_BYTES_PER_FRAME
+/// Memory of joining shards on so many threads, bytes, beside what the program takes for anything.
+pub fn join_bytes(survey: &Survey, threads: usize) -> u64 {
+    let memory = (JOIN_CACHE_BYTES, JOIN_BYTES_PER_FRAME);
+    bytes_of_frames(survey, survey.frames.len(), threads, memory)
 }
 
 /// Processor time of refining one of so many shards over that of refining the survey.
@@ -139,16 +144,21 @@ fn shard_frames(survey: &Survey, shards: usize) -> usize {
     most.unwrap_or(frames)
 }
 
-/// Memory for frames of a survey, bytes, with at most `cache_bytes` for decoded ones and
-/// `equation_bytes` of equations for each.
+/// Memory of refining frames of a survey on so many threads, bytes, with at most `cache_bytes` for
+/// decoded ones and `bytes_per_frame` beside.
 fn bytes_of_frames(
     survey: &Survey,
     frames: usize,
-    (cache_bytes, equation_bytes): (usize, f64),
+    threads: usize,
+    (cache_bytes, bytes_per_frame): (usize, f64),
 ) -> u64 {
     let frames = frames as f64;
     let [width, height] = survey.cameras.size().map(f64::from);
     let pixels = width * height;
     let cache = (frames * PYRAMID_BYTES_PER_PIXEL * pixels).min(cache_bytes as f64);
-    (cache + frames * equation_bytes) as u64
+    let threads = threads as f64;
+    let frame_of_window = threads * WINDOW_BYTES_PER_THREAD + pixels * WINDOW_BYTES_PER_PIXEL;
+    let window = frames.min(WINDOW_FRAMES) * frame_of_window;
+    let any_survey = ANY_SURVEY_BYTES + threads * BYTES_PER_THREAD;
+    (any_survey + window + cache + frames * bytes_per_frame) as u64
 }

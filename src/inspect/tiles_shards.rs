@@ -22,7 +22,7 @@ pub struct TextureShards<'a> {
     /// Options of the texture.
     pub options: TextureOptions,
     /// The run whose parts the shards are.
-    pub origin: &'a Origin,
+    pub origin: Origin,
     /// Receiver of progress.
     pub job: PanoramaJob<'a>,
 }
@@ -57,7 +57,7 @@ impl TextureShards<'_> {
         let room = stitch.budget(0)?.without_spare_room().room;
         let (plan, frames) = stitch.plan(settled);
         let bands = shard.range(plan.bands());
-        let mut files = BandFiles::new(folder, self.origin);
+        let mut files = BandFiles::new(folder, &self.origin);
         let progress = self.job.panorama(0);
         plan.draw_bands(bands.clone(), frames, room, &mut [&mut files], &progress)?;
         Ok(bands.len())
@@ -86,7 +86,7 @@ impl TextureShards<'_> {
         for shard in shards {
             let of_shard = parts.join(shard.name());
             for band in shard.range(plan.bands()) {
-                let band = read_band(&of_shard, band, self.origin)?;
+                let band = read_band(&of_shard, band, &self.origin)?;
                 tiles.target().put(&canvas, &band)?;
                 progress.advance(1);
             }

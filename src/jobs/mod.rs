@@ -13,7 +13,7 @@
 //! | the graph and its file | [`Job`] |
 //! | its folder, on this machine or on storage | [`JobFolder`] |
 //! | its tasks | [`plan()`] |
-//! | their calls, needs and expectations | `section_calls`, `section_work` |
+//! | their calls, needs and expectations | `section_calls`, `section_work`, `panorama_work` |
 //! | hash by which a task is done or not | `task_key` |
 //! | record of a task that is done | [`TaskRecord`] |
 //! | how the last attempt of a task ended | [`TaskState`] |
@@ -25,6 +25,7 @@ mod error;
 mod job;
 mod job_folder;
 mod network;
+mod panorama_work;
 mod plan;
 mod process;
 mod run_job;

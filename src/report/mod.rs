@@ -52,4 +52,4 @@ pub use refined_files::{
     CalibratedUnknown, Calibration, OVERLAY_FILE, REFINEMENT_FILE, RefinedFiles, Refinement,
     SECTIONS_FILE, poses_file,
 };
-pub use resolution::choose_resolution;
+pub use resolution::{MAX_FRAME_BYTES, MAX_PIXELS, choose_resolution};

@@ -6,9 +6,9 @@ use crate::survey::Survey;
 use crate::trajectory::Pose;
 
 /// Largest number of pixels of a compared panorama.
-const MAX_PIXELS: usize = 40_000_000;
+pub const MAX_PIXELS: usize = 40_000_000;
 /// Largest memory for frames, bytes.
-const MAX_FRAME_BYTES: u64 = 2 << 30;
+pub const MAX_FRAME_BYTES: u64 = 2 << 30;
 /// Factor by which the resolution is lowered per iteration.
 const RESOLUTION_STEP: f64 = std::f64::consts::FRAC_1_SQRT_2;
 

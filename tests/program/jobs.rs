@@ -222,3 +222,31 @@ fn jobs_that_cannot_be_planned_or_read_are_refused() {
     );
     assert!(!job.exists());
 }
+
+/// Every kind of task, on a stretch of several bands of the panorama for each shard.
+#[test]
+fn tasks_ask_for_the_memory_that_they_take() {
+    const MAX_NEED_OF_PEAK: f64 = 3.0;
+    let dir = tempfile::tempdir().unwrap();
+    let [survey, job] = ["s1", "job"].map(|name| dir.path().join(name));
+    let options = ["--frames", "40", "--size", "320x240", "--advance-m", "0.3"];
+    support::simulate(&survey, &options);
+    let steps = ["--steps", "refine,stitch,report,export"];
+    let of_job = ["plan-job", text(&survey), "--out", text(&job)];
+    for shards in ["1", "2"] {
+        let shards = ["--shards", shards];
+        succeed(&[&of_job[..], &steps, &shards].concat());
+        succeed(&["run-job", text(&job)]);
+        let read = |path: &Path| -> Value {
+            serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+        };
+        for task in read(&job.join("job.json"))["tasks"].as_array().unwrap() {
+            let id = task["id"].as_str().unwrap();
+            let need = task["needs"]["memory_bytes"].as_f64().unwrap();
+            let record = read(&job.join(format!("state/{id}.json")));
+            let peak = record["peak_bytes"].as_f64().unwrap();
+            let told = format!("{id} asks for {need} bytes and takes {peak}");
+            assert!(peak <= need && need <= MAX_NEED_OF_PEAK * peak, "{told}");
+        }
+    }
+}

@@ -92,6 +92,10 @@ def misbehave(fault: list[str], name: str, limit_seconds: float, log: TextIO) ->
             fail(TEMPORARY, f"task {name}: it was ended by signal {number}{place}")
         case ["full-disk"]:
             fail(TEMPORARY, f"task {name}: No space left on device{place}")
+        case ["full-disk-of", memory]:
+            if os.environ.get("STUB_MEMORY_BYTES") == memory:
+                fail(TEMPORARY, f"task {name}: No space left on device{place}")
+            return 0
         case ["memory", needed]:
             if int(os.environ.get("STUB_MEMORY_BYTES", "0")) < int(needed):
                 fail(TEMPORARY, f"task {name}: too little memory{place}")

@@ -119,6 +119,17 @@ def test_temporary_failures_are_retried_as_often_as_allowed(
     assert [skip.task for skip in summary.skipped] == ["K1.report"]
 
 
+def test_what_fails_on_a_worker_is_run_on_another(client: Client, make_job: MakeJob) -> None:
+    names = [f"K{k}.refine" for k in range(9)]
+    job = make_job([task(name, memory_bytes=900) for name in names])
+    for name in names:
+        # The worker of this memory; it is idle again at once, so that it is given much.
+        job.set_faults(name, *["full-disk-of 4000"] * 3)
+    summary, _ = run(job, client, retries=1)
+    assert sorted(summary.done) == names
+    assert summary.retried
+
+
 def test_a_task_out_of_memory_gets_a_worker_with_more(client: Client, make_job: MakeJob) -> None:
     tasks = [task(f"K{k}.refine", memory_bytes=900) for k in range(6)]
     job = make_job(tasks)

@@ -80,7 +80,9 @@ pub use output::plan::{Plan, Settled};
 pub use output::preview::Preview;
 pub use output::raster_target::{Kept, RasterLayer, RasterState, RasterTarget};
 pub use output::stitch::check_memory;
-pub use output::stitch::{LaidOut, Stitch, StitchOptions, lay_out, on_the_axis, render, stitch};
+pub use output::stitch::{
+    LaidOut, PlannedMemory, Stitch, StitchOptions, lay_out, on_the_axis, render, stitch,
+};
 pub use sampling::exposure::{Exposure, FrameExposure};
 pub use sampling::picture::Picture;
 pub use sampling::picture_cache::{PictureCache, level_for};

@@ -129,15 +129,17 @@ pub fn run(
     let options = arguments.textures.options();
     let mut outputs = OutputSet::default();
     let poses = poses_of(&trajectory);
-    let origin = resume::origin(&survey, &arguments.options_of_parts(), inputs.clone())?;
-    let texture = TextureShards {
-        survey: &survey,
-        poses: &poses,
-        options,
-        origin: &origin,
-        job: PanoramaJob::new(terminal, 1),
+    let texture = || -> Result<TextureShards, Failure> {
+        Ok(TextureShards {
+            survey: &survey,
+            poses: &poses,
+            options,
+            origin: resume::origin(&survey, &arguments.options_of_parts(), inputs.clone())?,
+            job: PanoramaJob::new(terminal, 1),
+        })
     };
     if let Some(parts) = arguments.folder_of_parts() {
+        let texture = texture()?;
         return match arguments.shard {
             Some(shard) => write_shard(&texture, parts, shard, terminal),
             None => write_seams(&texture, parts, terminal),
@@ -146,7 +148,7 @@ pub fn run(
     let has_wall = files.glb.is_some() || files.tiles.is_some();
     let job = PanoramaJob::new(terminal, usize::from(has_wall) + arguments.count_layers());
     let canvas = match (&arguments.join, &arguments.tiles) {
-        (Some(parts), Some(tiles)) => Some(join_shards(&texture, parts, tiles, &mut outputs)?),
+        (Some(parts), Some(tiles)) => Some(join_shards(&texture()?, parts, tiles, &mut outputs)?),
         _ if has_wall => Some(stage_wall(
             &survey,
             &poses,

@@ -22,7 +22,7 @@ pub fn write_seams(
 ) -> Result<(), Failure> {
     let settled = texture.settle()?;
     let file = parts.join(SEAMS_FILE);
-    write_part(&file, texture.origin, &settled)?;
+    write_part(&file, &texture.origin, &settled)?;
     terminal.say(format!(
         "found exposures and seams; wrote {}",
         printed(&file)
@@ -41,7 +41,7 @@ pub fn write_shard(
     shard: ShardNumber,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    let settled = read(&parts.join(SEAMS_FILE), texture.origin)?;
+    let settled = read(&parts.join(SEAMS_FILE), &texture.origin)?;
     let folder = parts.join(shard.name());
     let staged = StagedFolder::begin(&folder)?;
     let bands = texture.draw(settled, shard, staged.path())?;
@@ -66,7 +66,7 @@ pub fn join_shards(
     tiles: &Path,
     outputs: &mut OutputSet,
 ) -> Result<Canvas, Failure> {
-    let settled = read(&parts.join(SEAMS_FILE), texture.origin)?;
+    let settled = read(&parts.join(SEAMS_FILE), &texture.origin)?;
     let shards = shards_in(parts)?;
     Ok(texture.join((parts, &shards), settled, tiles, outputs)?)
 }

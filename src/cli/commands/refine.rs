@@ -340,7 +340,7 @@ impl RefineArguments {
         let threads = rayon::current_num_threads();
         match (self.shard, &self.join) {
             (Some(ShardNumber { of, .. }), _) => shard_bytes(survey, of, threads),
-            (None, Some(_)) => join_bytes(survey),
+            (None, Some(_)) => join_bytes(survey, threads),
             (None, None) => refine_bytes(survey, threads),
         }
     }

@@ -4,9 +4,8 @@ use crate::cli::output::Failure;
 use crate::render::available_bytes;
 use crate::survey::Survey;
 
-/// Memory that refining any survey takes, bytes: threads, windows of frames, and what the frames of
-/// a pyramid take while they are decoded.
-const MIN_FREE_BYTES: u64 = 128 << 20;
+/// Memory of the program, and that is to stay free, bytes.
+const MIN_FREE_BYTES: u64 = 48 << 20;
 
 /// Refuses to begin what would end without memory, if the system reports how much is free.
 /// `bytes`: memory of the run beside [`MIN_FREE_BYTES`].

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import dask
 from distributed import Client, LocalCluster
 from distributed.system import MEMORY_LIMIT
 
@@ -23,6 +24,9 @@ from .summary import INTERRUPTED, Summary
 
 # Exit code of bad input, as in tunnelstitch.
 BAD_INPUT = 3
+# Dask looks at its own processes many times a second. One that waits for a program needs no such
+# looks: on one machine they take processor time that the tasks need.
+QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -136,6 +140,7 @@ def _connect(choices: argparse.Namespace) -> Iterator[Client]:
 def _local_cluster(choices: argparse.Namespace) -> LocalCluster:
     """Workers on this machine, which declare an equal share of its memory each."""
     threads: int = choices.threads_per_worker
+    dask.config.set(QUIET)
     return LocalCluster(
         n_workers=choices.local,
         threads_per_worker=threads,

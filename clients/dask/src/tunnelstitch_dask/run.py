@@ -184,6 +184,8 @@ class JobRun:
                 limit_seconds=task.needs.limit_seconds + self._options.grace_seconds,
                 runs_after_failures=task.runs_after_failures,
             )
+            request = self._capacity.request(task.needs, state.memory_bytes)
+            others = self._capacity.others(request, state.failed_on)
             future = self._client.submit(
                 run_task,
                 call,
@@ -191,7 +193,9 @@ class JobRun:
                 # The first word names the group of tasks in Dask's dashboard.
                 key=(task.step, task.id, self._id, attempt),
                 priority=self._priorities[task.id],
-                resources=self._capacity.request(task.needs, state.memory_bytes) or None,
+                resources=request or None,
+                workers=others,
+                allow_other_workers=others is not None,
                 pure=False,
             )
             state.future = future
@@ -291,6 +295,7 @@ class JobRun:
         elif outcome.cause is Cause.BUSY:
             self._wait_for_other_run(state)
         else:
+            state.failed_on.add(outcome.worker)
             self._retry(state, outcome.cause, outcome.message, outcome.log)
 
     def _repeat_without_outcome(self, state: TaskState) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
@@ -48,6 +48,8 @@ class TaskState:
     """Time since which another client runs it."""
     retries: int = 0
     """Failures that count towards the largest number of retries."""
+    failed_on: set[str] = field(default_factory=set)
+    """Workers on which attempts have failed."""
 
     def end_attempt(self, due_s: float | None = None) -> None:
         """Ends the present attempt, so that nothing that it still tells counts."""

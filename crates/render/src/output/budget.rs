@@ -9,6 +9,7 @@ use crate::error::RenderError;
 use crate::layout::canvas::Canvas;
 use crate::layout::placement::Placement;
 use crate::layout::tiles::BAND_ROWS;
+use crate::sampling::exposure::Exposure;
 use crate::sampling::picture_cache::PictureCache;
 use crate::sampling::thumbnails::Thumbnails;
 use serde::Serialize;
@@ -23,6 +24,8 @@ pub struct Budget {
     pub grid: u64,
     /// Distance of its nodes, canvas pixels.
     pub grid_step_px: f64,
+    /// Observations of wall points for exposures, before bands are drawn.
+    pub exposure: u64,
     /// The band being drawn and written.
     pub band: u64,
     /// Memory of the output until it is finished.
@@ -66,50 +69,78 @@ impl Budget {
         limit: u64,
     ) -> Result<Self, RenderError> {
         let available = memory::available_bytes();
+        let threads = rayon::current_num_threads();
+        let work = (placements, options);
+        let least = Self::least(surface, canvas, frames, work, output, threads)?;
+        let needed = least.fixed() + least.frames_least;
+        memory::check_limit(canvas, frames, needed, limit, available)?;
+        let limit = available.map_or(limit, |available| limit.min(available));
+        Ok(least.within(limit, frames))
+    }
+
+    /// Computes the memory for drawing `canvas` on so many threads, with no more frames at a time
+    /// than a band needs, whatever is free.
+    ///
+    /// # Errors
+    /// [`RenderError`] of a camera that sees no wall.
+    pub(crate) fn least(
+        surface: &dyn Surface,
+        canvas: &Canvas,
+        frames: &PictureCache,
+        (placements, options): (&[Placement], &RenderOptions),
+        output: u64,
+        threads: usize,
+    ) -> Result<Self, RenderError> {
         let format = frames.format();
-        let (mut thumbnails, mut grid) = (0, 0);
+        let (mut thumbnails, mut grid, mut exposure) = (0, 0, 0);
         if options.needs_thumbnails() {
             let nodes = seam_grid::grid(canvas);
             grid = nodes.pixels() as u64 * Seams::bytes_per_node(format.channels);
             let level = Thumbnails::level(surface, frames, placements, &nodes)?;
             let size = frames.cameras().size();
             thumbnails = Thumbnails::bytes(size, level, format.channels, frames.len());
+            exposure = Exposure::solve_bytes(placements, canvas);
         }
         let rows = BAND_ROWS.min(canvas.rows);
         let pixel = format.pixel_bytes(true) as u64 + 4;
         let band = BAND_COPIES * u64::from(rows) * u64::from(canvas.columns) * pixel;
-        let threads = rayon::current_num_threads() as u64;
-        let decoding = DECODING_COPIES * threads * frames.full_frame_bytes();
+        let decoding = DECODING_COPIES * threads as u64 * frames.full_frame_bytes();
         let most = max_frames_in_a_band(canvas, placements) as u64;
         let frames_least = most * frames.frame_bytes();
         let readings = if options.super_resolve {
             let samples = frames.frame_bytes() / format.sample_bytes() as u64;
-            most * samples * FrameReadings::SAMPLE_BYTES + threads * SOLVER_BYTES
+            most * samples * FrameReadings::SAMPLE_BYTES + threads as u64 * SOLVER_BYTES
         } else {
             0
-        };
-        let fixed = thumbnails + grid + band + output + decoding + readings;
-        let needed = fixed + frames_least;
-        memory::check_limit(canvas, frames, needed, limit, available)?;
-        let limit = available.map_or(limit, |available| limit.min(available));
-        // With the frames of one band none is decoded twice while bands are drawn; with more, some
-        // are not even once more than for their thumbnails.
-        let room = if frames.is_compressed() {
-            limit - fixed
-        } else {
-            frames_least
         };
         Ok(Self {
             thumbnails,
             grid,
             grid_step_px: seam_grid::node_spacing_px(canvas),
+            exposure,
             band,
             output,
             decoding,
             readings,
             frames_least,
-            room,
+            room: frames_least,
         })
+    }
+
+    /// Keeps as many frames as `limit` bytes have room for, if decoding them again takes time.
+    ///
+    /// With the frames of one band none is decoded twice while bands are drawn; with more, some are
+    /// not even once more than for their thumbnails.
+    pub(crate) fn within(self, limit: u64, frames: &PictureCache) -> Self {
+        let room = match frames.is_compressed() {
+            // Frames of a band come after the observations for exposures.
+            true => limit.saturating_sub(self.fixed() + self.exposure),
+            false => 0,
+        };
+        Self {
+            room: room.max(self.frames_least),
+            ..self
+        }
     }
 
     /// Keeps no more frames than a band needs: enough where each is used for one purpose only.
@@ -121,13 +152,22 @@ impl Budget {
 
     /// Largest memory at any time, with `frames` bytes of frames in all.
     pub fn most(&self, frames: u64) -> u64 {
-        self.thumbnails
-            + self.grid
-            + self.band
-            + self.output
-            + self.decoding
-            + self.readings
-            + frames.min(self.room)
+        self.fixed() + self.exposure + frames.min(self.room)
+    }
+
+    /// Memory while exposures and seams are found, bytes.
+    pub(crate) fn settling(&self) -> u64 {
+        self.thumbnails + self.grid + self.exposure + self.decoding + self.room
+    }
+
+    /// Memory while bands are drawn with exposures and seams that were found before, bytes.
+    pub(crate) fn drawing(&self) -> u64 {
+        self.grid + self.band + self.output + self.decoding + self.readings + self.room
+    }
+
+    /// Memory beside that of frames and of observations for exposures, bytes.
+    fn fixed(&self) -> u64 {
+        self.thumbnails + self.grid + self.band + self.output + self.decoding + self.readings
     }
 }
 

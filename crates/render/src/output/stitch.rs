@@ -30,6 +30,19 @@ pub struct StitchOptions {
     pub memory: u64,
 }
 
+/// Memory of a panorama as a whole and in shards, bytes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PlannedMemory {
+    /// Drawn as a whole, with as many frames as there is room for.
+    pub whole: u64,
+    /// Finding its exposures and seams, with the frames of one band at a time.
+    pub seams: u64,
+    /// Drawing a shard, likewise.
+    pub shard: u64,
+    /// Putting it together from shards.
+    pub join: u64,
+}
+
 /// Resolution of a wall that is solved from all frames, in units of the frames' own. A higher value
 /// is slower and gains little.
 const SUPER_RESOLVE_SCALE: f64 = 2.0;
@@ -184,6 +197,29 @@ impl<'a> Stitch<'a> {
             output,
             self.options.memory,
         )
+    }
+
+    /// Computes the memory on so many threads of a machine with as much as may be used, of which
+    /// the output holds `output` bytes.
+    ///
+    /// # Errors
+    /// [`RenderError`] of a camera that sees no wall.
+    pub fn planned_memory(
+        &self,
+        output: u64,
+        threads: usize,
+    ) -> Result<PlannedMemory, RenderError> {
+        let work = (&self.laid_out.placements[..], &self.options.render);
+        let canvas = &self.laid_out.canvas;
+        let least = Budget::least(self.surface, canvas, &self.frames, work, output, threads)?;
+        let frames = self.frames.frame_bytes() * self.frames.len() as u64;
+        let most = least.within(self.options.memory, &self.frames);
+        Ok(PlannedMemory {
+            whole: most.most(frames),
+            seams: least.settling().max(least.drawing()),
+            shard: least.drawing(),
+            join: output + least.grid,
+        })
     }
 
     /// Finds exposures and seams, within a budget. As many frames as there is room for stay in
