@@ -56,10 +56,16 @@ const where = async () => {
     clock: /, (\d+:\d\d) o'clock/.exec(place)?.[1],
   };
 };
-/** The next state of what is told now and then. */
+/** Waits until the page is drawn so many times. */
+const drawn = (times) =>
+  page.evaluate(async (times) => {
+    for (let k = 0; k < times; k++) await new Promise(requestAnimationFrame);
+  }, times);
+/** The next state of what is told now and then, as the page is drawn. */
 const told = async () => {
   await complete();
   await page.waitForTimeout(900);
+  await drawn(2);
   const statistics = await page.textContent("#statistics");
   return {
     ...(await where()),
@@ -72,11 +78,6 @@ const go = async (hash) => {
   await page.evaluate((hash) => (location.hash = hash), hash);
   return told();
 };
-/** Waits until the page is drawn so many times. */
-const drawn = (times) =>
-  page.evaluate(async (times) => {
-    for (let k = 0; k < times; k++) await new Promise(requestAnimationFrame);
-  }, times);
 /** Waits until it is enough, by where you are and were; how fast one walks depends on how fast the page is drawn. */
 const until = async (enough) => {
   for (let k = 0, before = await where(); k < 40; k++) {
