@@ -82,7 +82,7 @@ const go = async (hash) => {
 const until = async (enough) => {
   for (let k = 0, before = await where(); k < 40; k++) {
     await page.waitForTimeout(500);
-    await drawn(10);
+    await drawn(3);
     const now = await where();
     if (enough(now, before)) break;
     before = now;
