@@ -71,10 +71,21 @@ pub(super) fn stamped_lines(
     duplicates: DuplicateTimes,
     parse_line: impl Fn(&str) -> Result<PoseEntry, String>,
 ) -> Result<ParsedPoses, PoseError> {
+    stamped_rows(path, lines(text), duplicates, parse_line)
+}
+
+/// Parses the pose of each row, given with its 1-based number. Names and times are each there once,
+/// but for the times that `duplicates` admits.
+pub(super) fn stamped_rows<'t>(
+    path: &Path,
+    rows: impl Iterator<Item = (usize, &'t str)>,
+    duplicates: DuplicateTimes,
+    parse_row: impl Fn(&str) -> Result<PoseEntry, String>,
+) -> Result<ParsedPoses, PoseError> {
     let mut entries = EntryList::new(duplicates);
     let mut names = Names::default();
-    for (number, line) in lines(text) {
-        parse_line(line)
+    for (number, row) in rows {
+        parse_row(row)
             .and_then(|entry| {
                 entry
                     .name

@@ -139,8 +139,9 @@ pub fn pose_bounds(
     let frames = FrameStates::at(&poses_of(truth), vec![None; count]);
     let extent_h_m = extent_h_m(&footprints(&flat, &frames)?);
     let model = wall.model(survey.nominal.perimeter_m(), extent_h_m);
+    let information = wall.information(&model);
     let context = EstimationContext {
-        shape: (model.blocks() > 0).then(|| Arc::new(Shape::nominal(model.clone()))),
+        shape: (model.blocks() > 0).then(|| Arc::new(Shape::nominal(model))),
         ..flat
     };
     let estimates = frames.estimates;
@@ -160,7 +161,7 @@ pub fn pose_bounds(
     let noise_grey = f64::from(FINER) * noise_grey;
     let problem = PhotometricProblem::new(&context, sampling, window)?.with_known_noise(noise_grey);
     let unknowns = problem.unknowns_of(&estimates);
-    let field = FieldPrior::new(problem.pattern(), count, wall.information(&model));
+    let field = FieldPrior::new(problem.pattern(), count, information);
     let (prior, _) = problem.prior_information(&unknowns, problem.pattern());
     let with_prior = problem.linearise(&estimates)?.normal;
     let bayesian = invert(&problem, &field, &with_prior, count)?;

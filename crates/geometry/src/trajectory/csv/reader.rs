@@ -6,7 +6,7 @@ use super::header::Header;
 use super::pose_column::PoseColumn;
 use super::table::split;
 use super::title::is_length_unit;
-use crate::trajectory::entry_list::{EntryList, ParsedPoses};
+use crate::trajectory::entry_list::ParsedPoses;
 use crate::trajectory::error::PoseError;
 use crate::trajectory::nanoseconds::from_nanoseconds;
 use crate::trajectory::pose::Pose;
@@ -53,20 +53,9 @@ pub(crate) fn parse(
         separator: header.separator,
         time_unit: options.time_unit,
     };
-    let mut entries = EntryList::new(options.duplicate_times);
-    let mut names = text::Names::default();
-    for (number, line) in records {
+    text::stamped_rows(path, records, options.duplicate_times, |line| {
         row.read(line)
-            .and_then(|entry| {
-                entry
-                    .name
-                    .as_deref()
-                    .map_or(Ok(()), |name| names.add(name))?;
-                entries.push(number, entry)
-            })
-            .map_err(fail(number))?;
-    }
-    Ok(entries.into_parsed())
+    })
 }
 
 /// The only column with the name of a picture, whatever its title (`Bild`, `Photo ID`): without it,
