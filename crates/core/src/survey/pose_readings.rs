@@ -15,17 +15,9 @@ use std::ops::RangeInclusive;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{
-    AngleUnit, CameraAxes, Convention, EulerSequence, Pose, PoseFormat, StampedPose, Trajectory,
+    AngleUnit, CameraAxes, Convention, EulerSequence, LengthUnit, Pose, PoseFormat, StampedPose,
+    Trajectory,
 };
-
-/// Units that positions may be given in instead of metres: their names, and their lengths, metres.
-const UNITS: [(&str, f64); 5] = [
-    ("millimetres", 0.001),
-    ("centimetres", 0.01),
-    ("inches", 0.0254),
-    ("feet", 0.3048),
-    ("kilometres", 1000.0),
-];
 
 /// Radii of a round tunnel over the given one that people confuse, and what they gave.
 const RADIUS_SLIPS: [(f64, &str); 4] = [
@@ -366,9 +358,11 @@ fn other_texts(section: &PosesSection, given: &InterpretedPoses) -> Vec<PoseRead
         let remedy = "the poses in reverse order (reversed = true under [poses])";
         add(remedy.to_owned(), given.reversed());
     }
-    for (name, unit_m) in UNITS.into_iter().filter(|_| section.unit_m.is_none()) {
-        let remedy = format!("positions in {name} (unit_m = {unit_m} under [poses])");
-        add(remedy, given.in_unit(unit_m));
+    if section.unit_m.is_none() {
+        for LengthUnit { name, length_m, .. } in LengthUnit::OTHERS {
+            let remedy = format!("positions in {name} (unit_m = {length_m} under [poses])");
+            add(remedy, given.in_unit(length_m));
+        }
     }
     others
 }

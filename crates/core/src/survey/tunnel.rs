@@ -5,13 +5,14 @@ use super::ignore::IgnoreSection;
 use super::shape_file::ShapeFile;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::surface::section::{CircleOutline, Ellipse, PiecewiseOutline, Section};
 use tunnelstitch_geometry::surface::{
     CentrePoint, Centreline, Circle, Prism, SIZES_M, Surface, Swept,
 };
-use tunnelstitch_geometry::trajectory::{PoseError, text};
+use tunnelstitch_geometry::trajectory::{LengthUnit, PoseError, text};
 
 /// 1-σ of a real lining's deviation from its nominal shape, radii: a centimetre at a radius of
 /// three metres.
@@ -19,7 +20,9 @@ pub const DEFAULT_SHAPE_SIGMA_RADII: f64 = 1.0 / 300.0;
 /// Largest 1-σ of it, radii.
 const MAX_SHAPE_SIGMA_RADII: f64 = 0.1;
 /// Radius above which a unit is more likely wrong, metres: the widest caverns span 100 m.
-const MAX_USUAL_RADIUS_M: f64 = 100.0;
+const MAX_RADIUS_M: f64 = 100.0;
+/// Radii of most tunnels and pipes, metres.
+const USUAL_RADII_M: RangeInclusive<f64> = 0.05..=10.0;
 /// Largest 1-σ of the radius, percent.
 const MAX_RADIUS_SIGMA_PERCENT: f64 = 30.0;
 
@@ -101,16 +104,24 @@ impl TunnelSection {
             .unwrap_or_default()
     }
 
-    /// The sentence about a radius that no tunnel has, if it is one.
+    /// The sentence about a radius that no tunnel has, if it is one: with the radius in metres by
+    /// the units of length in which it is a usual one.
     pub fn size_warning(&self) -> Option<String> {
-        let radius_m = self
-            .radius_m
-            .filter(|radius_m| *radius_m > MAX_USUAL_RADIUS_M)?;
+        let radius_m = self.radius_m.filter(|radius_m| *radius_m > MAX_RADIUS_M)?;
+        let metres = |unit: &LengthUnit| (radius_m * unit.length_m * 1e3).round() / 1e3;
+        let units = LengthUnit::OTHERS.into_iter();
+        let usual = units.filter(|unit| USUAL_RADII_M.contains(&metres(unit)));
+        let readings = usual
+            .map(|unit| {
+                format!(
+                    "; if it is in {}, write radius_m = {}",
+                    unit.name,
+                    metres(&unit)
+                )
+            })
+            .collect::<String>();
         Some(format!(
-            "tunnel.radius_m is {radius_m}, and no tunnel is so wide; if it is in millimetres, \
-             write radius_m = {}, if in inches, radius_m = {}",
-            radius_m / 1e3,
-            (radius_m * 25.4).round() / 1e3
+            "tunnel.radius_m is {radius_m} metres, and no tunnel is so wide{readings}"
         ))
     }
 
@@ -313,10 +324,13 @@ mod tests {
     }
 
     #[test]
-    fn a_radius_in_millimetres_is_named() {
+    fn a_radius_in_another_unit_is_named() {
         let warning = |radius_m| TunnelSection::round(radius_m).size_warning();
         assert_eq!(warning(40.0), None);
-        assert!(warning(3000.0).unwrap().ends_with("radius_m = 3"));
+        let millimetres = warning(3000.0).unwrap();
+        assert!(millimetres.ends_with("so wide; if it is in millimetres, write radius_m = 3"));
+        let inches = warning(120.0).unwrap();
+        assert!(inches.ends_with("if it is in inches, write radius_m = 3.048"));
     }
 
     #[test]

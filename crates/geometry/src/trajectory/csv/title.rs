@@ -2,6 +2,7 @@
 
 use super::pose_column::PoseColumn;
 use crate::trajectory::euler::AngleUnit;
+use crate::trajectory::length_unit::LengthUnit;
 use crate::trajectory::time_unit::TimeUnit;
 
 const FRAME: &[&str] = &[
@@ -155,11 +156,12 @@ impl Title {
     /// Metres of the unit of a length, which brackets or the last word of the name tell.
     pub fn length_unit_m(&self) -> Option<f64> {
         let last = self.name.rsplit_once('_').map_or("", |(_, last)| last);
-        length_unit_m(if self.unit.is_empty() {
+        let word = if self.unit.is_empty() {
             last
         } else {
             &self.unit
-        })
+        };
+        LengthUnit::of_word(word).map(|unit| unit.length_m)
     }
 
     /// Row and column of an entry of a matrix, as `r11`, `R_0_2` or `m03` name it.
@@ -210,20 +212,7 @@ fn is_axis_of(name: &str, axis: &str, letter: char, words: &[&str]) -> bool {
 
 /// True for the unit of a length, in brackets or not.
 pub(super) fn is_length_unit(word: &str) -> bool {
-    length_unit_m(word.trim_matches(['[', ']', '(', ')'])).is_some()
-}
-
-/// Metres of the unit of a length.
-fn length_unit_m(word: &str) -> Option<f64> {
-    Some(match word.to_lowercase().as_str() {
-        "m" | "metre" | "metres" | "meter" | "meters" => 1.0,
-        "mm" | "millimetres" => 1e-3,
-        "cm" | "centimetres" => 1e-2,
-        "km" | "kilometres" => 1e3,
-        "ft" | "foot" | "feet" => 0.3048,
-        "in" | "inch" | "inches" => 0.0254,
-        _ => return None,
-    })
+    LengthUnit::of_word(word.trim_matches(['[', ']', '(', ')'])).is_some()
 }
 
 #[cfg(test)]
