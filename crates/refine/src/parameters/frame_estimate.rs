@@ -7,6 +7,9 @@ use tunnelstitch_geometry::trajectory::Pose;
 /// Number of parameters of a frame: rotation (3), translation (3), log-gain, bias.
 pub const FRAME_PARAMETERS: usize = 8;
 
+/// Those of them that are the pose; the exposure follows.
+pub const POSE_PARAMETERS: usize = 6;
+
 /// A step of one frame's parameters: `(ω, ρ, δα, δβ)` in radians, metres, 1, grey levels.
 pub type FrameStep = SVector<f64, FRAME_PARAMETERS>;
 

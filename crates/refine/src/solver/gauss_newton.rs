@@ -6,7 +6,9 @@
 use crate::linear::factor_error::FactorError;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
-use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameEstimate, FrameStep};
+use crate::parameters::frame_estimate::{
+    FRAME_PARAMETERS, FrameEstimate, FrameStep, POSE_PARAMETERS,
+};
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::linearisation::Linearisation;
 use crate::problem::patch_scores::PatchScores;
@@ -118,8 +120,9 @@ pub struct SolveState {
 ///
 /// Frames that a step would make infeasible ([`PhotometricProblem::is_feasible`]) keep their
 /// estimates. After a short step the equations are updated by a share of the tiles
-/// ([`crate::problem::linearise_change`]). The last step, undamped and shorter than the tolerance,
-/// is not judged: cost and equations are those before it.
+/// ([`crate::problem::linearise_change`]), and computed from all of them where the step that
+/// follows is not good. The last step, undamped and shorter than the tolerance, is not judged: cost
+/// and equations are those before it.
 ///
 /// Source: P. Wolfe, "Convergence conditions for ascent methods", SIAM Review 11(2), 1969 (the
 /// slope along a step).
@@ -273,7 +276,7 @@ impl DampedGaussNewton {
         &mut self,
         problem: &PhotometricProblem,
         unknowns: &Unknowns,
-        current: Linearisation,
+        mut current: Linearisation,
     ) -> Result<(Unknowns, Linearisation), ProblemError> {
         let frames = &unknowns.frames;
         let mut undamped_failed = false;
@@ -329,7 +332,7 @@ impl DampedGaussNewton {
                 // An undamped step is δ = −α H⁻¹ g, with its length α.
                 let is_whole = self.lambda == 0.0 && all_feasible;
                 let curvature = |before: f64, after: f64| (1.0 - after / before) / length;
-                let of_poses = |at| slots_slope(&step[..frames.len()], at, 6);
+                let of_poses = |at| slots_slope(&step[..frames.len()], at, POSE_PARAMETERS);
                 record.curvature = is_whole.then(|| curvature(of_poses(&current), of_poses(&next)));
                 self.decrement = is_whole.then_some(decrement);
                 self.steps.push(record);
@@ -341,6 +344,12 @@ impl DampedGaussNewton {
                 self.lower_damping();
                 self.updated_from = share.map(|stride| (unknowns.clone(), stride));
                 return Ok((candidate, next));
+            }
+            if is_updated {
+                // Their errors, not the length of the step, may be what is bad.
+                self.updated_from = None;
+                current = problem.linearise_at(unknowns)?;
+                continue;
             }
             undamped_failed |= self.lambda == 0.0;
             self.raise_damping();

@@ -173,26 +173,30 @@ impl<'s> ShapeEquations<'s> {
     /// Learns the strengths, and drops scales of no use ([`learn_shape`]); None if the equations
     /// are singular.
     pub fn learn(self, most_m: f64, alpha: f64) -> Option<LearnedShape<'s>> {
-        let scales = &self.shape.model.scales;
+        let count = self.shape.model.scales.len();
         let mut sigmas_m = self.sigmas_m();
-        let mut dropped = vec![false; scales.len()];
-        let threshold = 0.5 * normal_quantile(alpha, scales.len()).powi(2);
+        let mut dropped = vec![false; count];
+        let threshold = 0.5 * normal_quantile(alpha, count).powi(2);
         loop {
             let minimum = self.fixed_point(&mut sigmas_m, most_m, &dropped)?;
+            // The weakest ones gain nothing.
+            for (k, dropped) in dropped.iter_mut().enumerate() {
+                *dropped |= sigmas_m[k] <= self.weakest_m(k);
+            }
             let gain = |k: usize| {
                 let mut without = sigmas_m.clone();
-                without[k] = NEGLIGIBLE * scales[k].sigma_m;
+                without[k] = self.weakest_m(k);
                 let without = self.minimum(&without)?.log_evidence;
                 Some((k, minimum.log_evidence - without))
             };
-            let left: Vec<usize> = (0..scales.len()).filter(|k| !dropped[*k]).collect();
+            let left: Vec<usize> = (0..count).filter(|k| !dropped[*k]).collect();
             let gains = left.par_map(|k| gain(*k)).into_iter();
             let gains: Vec<(usize, f64)> = gains.collect::<Option<_>>()?;
             let worst = gains.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
             match worst.filter(|(_, gain)| *gain < threshold) {
                 Some((k, _)) => {
                     dropped[k] = true;
-                    sigmas_m[k] = NEGLIGIBLE * scales[k].sigma_m;
+                    sigmas_m[k] = self.weakest_m(k);
                 }
                 None => {
                     return Some(LearnedShape {
@@ -204,6 +208,12 @@ impl<'s> ShapeEquations<'s> {
                 }
             }
         }
+    }
+
+    /// The strength of scale `k` when it is as good as dropped, metres. Weaker ones are lost in
+    /// rounding.
+    fn weakest_m(&self, k: usize) -> f64 {
+        NEGLIGIBLE * self.shape.model.scales[k].sigma_m
     }
 
     /// The factor of the normal matrix for the strengths `sigmas_m`; None if it is singular.
@@ -289,9 +299,7 @@ impl<'s> ShapeEquations<'s> {
                 let learned = (square / determined.max(f64::MIN_POSITIVE)).sqrt();
                 let factor = (learned.min(most_m) / sigmas_m[k])
                     .clamp(1.0 / MAX_STEP_FACTOR, MAX_STEP_FACTOR);
-                // Weaker ones are lost in rounding.
-                let least_m = NEGLIGIBLE * self.shape.model.scales[k].sigma_m;
-                let next_m = (factor * sigmas_m[k]).max(least_m);
+                let next_m = (factor * sigmas_m[k]).max(self.weakest_m(k));
                 largest_change = largest_change.max((next_m / sigmas_m[k]).ln().abs());
                 sigmas_m[k] = next_m;
             }

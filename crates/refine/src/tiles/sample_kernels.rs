@@ -4,7 +4,7 @@
 //! With the pixel `(x, y)` to the upper left of a sample and the fractions `(f, g)` from it, values
 //! are `Σ_ij K(j − g) K(i − f) I(x + i, y + j)` ([`Interpolation`]), rows before columns.
 
-use crate::tiles::grid::{LANES, Plane, ZERO};
+use crate::tiles::grid::{Plane, ZERO};
 use crate::tiles::interpolation::{Interpolation, cubic_weights};
 use tunnelstitch_core::frames::GreyImage;
 use tunnelstitch_geometry::camera::{LensF32, LensLoop, ProjectF32};
@@ -124,15 +124,28 @@ pub fn interpolate(
     );
 }
 
+/// The pixels of `N` rows below each other: those at the same index in each. As all have one
+/// length, one comparison of an index with it serves for all rows.
+#[inline(always)]
+fn rows<const N: usize>(data: &[f32], width: usize) -> [&[f32]; N] {
+    let count = data.len() - (N - 1) * width;
+    let mut rows = [data; N];
+    for (j, row) in rows.iter_mut().enumerate() {
+        *row = &data[j * width..][..count];
+    }
+    rows
+}
+
 /// Bilinear interpolation.
 #[inline(always)]
 fn bilinear(data: &[f32], width: usize, positions: &SamplePositions, values: &mut Plane) {
     let (fu, fv) = (&positions.fu, &positions.fv);
+    let [upper_row, lower_row] = rows::<2>(data, width);
     let (mut upper, mut lower) = ([[0.0f32; 2]; ZERO.len()], [[0.0f32; 2]; ZERO.len()]);
     for k in 0..ZERO.len() {
-        let top = positions.index[k] as usize;
-        upper[k].copy_from_slice(&data[top..top + 2]);
-        lower[k].copy_from_slice(&data[top + width..top + width + 2]);
+        let start = positions.index[k] as usize;
+        upper[k].copy_from_slice(&upper_row[start..start + 2]);
+        lower[k].copy_from_slice(&lower_row[start..start + 2]);
     }
     for k in 0..ZERO.len() {
         let a = upper[k][0] + fu[k] * (upper[k][1] - upper[k][0]);
@@ -141,38 +154,40 @@ fn bilinear(data: &[f32], width: usize, positions: &SamplePositions, values: &mu
     }
 }
 
-/// Bicubic interpolation, [`LANES`] samples at a time.
+/// Bicubic interpolation.
 #[inline(always)]
 fn bicubic(data: &[f32], width: usize, positions: &SamplePositions, values: &mut Plane) {
-    for first in (0..ZERO.len()).step_by(LANES) {
-        let (mut across, mut down) = ([[0.0f32; LANES]; 4], [[0.0f32; LANES]; 4]);
-        for lane in 0..LANES {
-            let k = first + lane;
-            let (u, v) = (
-                cubic_weights(positions.fu[k]),
-                cubic_weights(positions.fv[k]),
-            );
+    let rows = rows::<4>(data, width);
+    let to_first = width as u32 + 1;
+    let (mut across, mut down) = ([ZERO; 4], [ZERO; 4]);
+    write_weights(&positions.fu, &mut across);
+    write_weights(&positions.fv, &mut down);
+    let mut columns = [[0.0f32; 4]; ZERO.len()];
+    for k in 0..ZERO.len() {
+        let start = positions.index[k].wrapping_sub(to_first) as usize;
+        let mut sums = [0.0f32; 4];
+        for j in 0..4 {
+            let pixels: &[f32] = &rows[j][start..start + 4];
             for i in 0..4 {
-                (across[i][lane], down[i][lane]) = (u[i], v[i]);
+                sums[i] += down[j][k] * pixels[i];
             }
         }
-        let mut columns = [[0.0f32; 4]; LANES];
-        for lane in 0..LANES {
-            let start = positions.index[first + lane] as usize - width - 1;
-            let mut sums = [0.0f32; 4];
-            for (row, weights) in down.iter().enumerate() {
-                let at = start + row * width;
-                let pixels: &[f32] = &data[at..at + 4];
-                for i in 0..4 {
-                    sums[i] += weights[lane] * pixels[i];
-                }
-            }
-            columns[lane] = sums;
-        }
-        for lane in 0..LANES {
-            let [a, b, c, d] = columns[lane];
-            let left = across[0][lane] * a + across[1][lane] * b;
-            values[first + lane] = left + (across[2][lane] * c + across[3][lane] * d);
+        columns[k] = sums;
+    }
+    for k in 0..ZERO.len() {
+        let [a, b, c, d] = columns[k];
+        let left = across[0][k] * a + across[1][k] * b;
+        values[k] = left + (across[2][k] * c + across[3][k] * d);
+    }
+}
+
+/// Writes [`cubic_weights`] at all samples.
+#[inline(always)]
+fn write_weights(fractions: &Plane, weights: &mut [Plane; 4]) {
+    for k in 0..ZERO.len() {
+        let of_sample = cubic_weights(fractions[k]);
+        for i in 0..4 {
+            weights[i][k] = of_sample[i];
         }
     }
 }
