@@ -124,18 +124,21 @@ impl RadialField {
         let support = |s_m: f64, h_m: f64| self.lattice.support(WallPoint { s_m, h_m });
         let columns: Vec<Support> = s_m.iter().map(|s_m| support(*s_m, 0.0)).collect();
         let mut grid = Vec::with_capacity(s_m.len() * h_m.len());
+        // Sums along s at every s, which all h between two rows of nodes have in common.
+        let mut along_s: (Option<i64>, Vec<[f64; SUPPORT]>) = (None, Vec::new());
         for h_m in h_m {
             let across = support(0.0, *h_m);
-            let rows: [&[f64]; SUPPORT] =
-                std::array::from_fn(|j| self.row(across.first_row + j as i64));
-            grid.extend(columns.iter().map(|column| {
-                let mut delta_m = 0.0;
-                for (row, weight) in rows.iter().zip(across.along_h) {
-                    if let Some(values) = column.values_of(row) {
-                        delta_m += weight * values;
-                    }
-                }
-                delta_m
+            if along_s.0 != Some(across.first_row) {
+                let rows: [&[f64]; SUPPORT] =
+                    std::array::from_fn(|j| self.row(across.first_row + j as i64));
+                let sums = columns
+                    .iter()
+                    .map(|column| rows.map(|row| column.values_of(row)));
+                along_s = (Some(across.first_row), sums.collect());
+            }
+            grid.extend(along_s.1.iter().map(|values| {
+                let terms = values.iter().zip(across.along_h);
+                terms.fold(0.0, |delta_m, (value, weight)| delta_m + weight * value)
             }));
         }
         grid

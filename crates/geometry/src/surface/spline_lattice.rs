@@ -43,15 +43,13 @@ pub struct Support {
 }
 
 impl Support {
-    /// Sum along s of a row of coefficients; None for an empty row.
+    /// Sum along s of a row of coefficients; 0 of an empty row.
     #[inline]
-    pub(super) fn values_of(&self, row: &[f64]) -> Option<f64> {
+    pub(super) fn values_of(&self, row: &[f64]) -> f64 {
         let terms = self.columns.iter().zip(self.along_s);
-        let mut sum = 0.0;
-        for (column, weight) in terms {
-            sum += weight * row.get(*column)?;
-        }
-        Some(sum)
+        terms
+            .filter_map(|(column, weight)| Some(weight * row.get(*column)?))
+            .fold(0.0, |sum, term| sum + term)
     }
 }
 
@@ -75,13 +73,14 @@ impl SplineLattice {
         let u = (wall.s_m - self.origin.s_m) / spacing_m;
         let v = (wall.h_m - self.origin.h_m) / spacing_m;
         let (i, j) = (u.floor(), v.floor());
-        let columns = self.columns as i64;
+        let first = (i as i64 - 1).rem_euclid(self.columns as i64) as usize;
         let (along_s, slope_s) = cubic_b_spline(u - i);
         let (along_h, slope_h) = cubic_b_spline(v - j);
         Support {
             first_row: j as i64 - 1,
-            columns: std::array::from_fn(|k| {
-                (i as i64 - 1 + k as i64).rem_euclid(columns) as usize
+            columns: std::array::from_fn(|k| match first + k {
+                column if column < self.columns => column,
+                beyond => beyond - self.columns,
             }),
             along_h,
             along_s,

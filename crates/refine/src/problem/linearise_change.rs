@@ -226,32 +226,6 @@ impl PhotometricProblem<'_> {
         }
     }
 
-    /// The gradients of all blocks of the wall at the unknowns `to`; `at`: the equations at the
-    /// unknowns `from`, whose own gradients of blocks are taken.
-    ///
-    /// # Errors
-    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
-    pub fn take_block_gradients(
-        &self,
-        at: &mut Linearisation,
-        (from, to): (&Unknowns, &Unknowns),
-    ) -> Result<Vec<BlockGradient>, ProblemError> {
-        let mut gradients = std::mem::take(&mut at.block_gradients);
-        let (step, shared) = from.local(to);
-        let moved = self.wall_step_px(&from.frames, &step, &shared);
-        let step_px = moved.into_iter().fold(0.0, f64::max);
-        let Some(stride) = self.change_share(at, step_px) else {
-            drop(gradients);
-            return Ok(self.linearise_at(to)?.block_gradients);
-        };
-        for (unknowns, factor) in [(from, -1.0), (to, 1.0)] {
-            self.visit_share(unknowns, TileShare::OneIn(stride), &mut |k, part| {
-                gradients[k].add(&part.gradient(), factor * stride as f64);
-            })?;
-        }
-        Ok(gradients)
-    }
-
     /// Visits a share of the tiles of every block, with the index of the block.
     fn visit_share(
         &self,

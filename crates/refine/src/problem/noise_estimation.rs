@@ -39,27 +39,31 @@ impl PhotometricProblem<'_> {
     /// Estimates the noise model and the spectrum of the texture from the residuals around the
     /// plain mean in some tiles spread over the wall.
     pub(super) fn estimate_noise(&mut self) -> Result<(), ProblemError> {
+        // Before that, the residuals of coarser levels are mostly misalignment.
+        let is_aligned = self.sampling.level == 0 || self.sampling.variance_weighting;
+        let has_denoiser = is_aligned && self.active.len() > 1;
         let counted = self.gather_from_tiles(
             NOISE_ESTIMATION_TILES,
-            |(histogram, spectrum): &mut (NoiseHistogram, TextureSpectrum), tile| {
+            |(histogram, spectrum): &mut (NoiseHistogram, Option<TextureSpectrum>), tile| {
                 dispatch_simd(
                     #[inline(always)]
                     || {
                         let observations = tile.observations();
-                        tile.workspace.count_residuals(
-                            tile.points,
-                            observations,
-                            histogram,
-                            spectrum,
-                        );
+                        tile.workspace
+                            .count_residuals(tile.points, observations, histogram);
+                        if has_denoiser {
+                            tile.workspace
+                                .add_to_spectrum(spectrum.get_or_insert_default());
+                        }
                     },
                 );
             },
         )?;
-        let (mut histogram, mut spectrum) = (NoiseHistogram::default(), TextureSpectrum::default());
+        let (mut histogram, mut spectrum) = (NoiseHistogram::default(), None);
         for (residuals, textures) in counted {
             histogram = histogram.merge(&residuals);
-            spectrum = spectrum.merge(textures);
+            let both = spectrum.into_iter().chain(textures);
+            spectrum = both.reduce(TextureSpectrum::merge);
         }
         self.noise = histogram.fit();
         // The residuals are a little too small, as S is fitted to them. Single images give a better
@@ -76,11 +80,7 @@ impl PhotometricProblem<'_> {
         if single > fitted && single < MAX_NOISE_UNDERESTIMATE * fitted {
             self.noise.floor = single as f32;
         }
-        // Before that, the residuals of coarser levels are mostly misalignment.
-        let is_aligned = self.sampling.level == 0 || self.sampling.variance_weighting;
-        if is_aligned && self.active.len() > 1 {
-            self.denoiser = Some(spectrum.denoiser());
-        }
+        self.denoiser = spectrum.as_ref().map(TextureSpectrum::denoiser);
         // The variance of a sample is that of a pixel times `β(0)²`.
         self.sigma = f64::from(self.noise.floor).sqrt() / axis;
         self.unit_variance = if self.sampling.variance_weighting || self.sampling.joint {

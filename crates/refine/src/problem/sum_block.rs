@@ -156,11 +156,14 @@ impl PhotometricProblem<'_> {
         tiles: &'t [Tile],
         misfits: &mut Vec<Misfit>,
     ) -> Vec<SampledTile<'t>> {
-        let mut scratch = Vec::new();
+        let (mut scratch, mut sorted) = (Vec::new(), Vec::new());
         let sample = |tile: &'t Tile| {
             let points = TilePoints::new(&self.grid, context.surface, tile.id, &mut scratch);
             let observers = context.visibility.observers(tile);
-            let mut workspace = TileWorkspace::default();
+            let mut workspace = TileWorkspace {
+                sorted: std::mem::take(&mut sorted),
+                ..TileWorkspace::default()
+            };
             dispatch_simd(
                 #[inline(always)]
                 || {
@@ -170,6 +173,7 @@ impl PhotometricProblem<'_> {
                 },
             );
             misfits.append(&mut workspace.misfits);
+            sorted = std::mem::take(&mut workspace.sorted);
             SampledTile {
                 tile,
                 points,

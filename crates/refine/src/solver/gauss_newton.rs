@@ -57,17 +57,11 @@ impl Solution<'_> {
         self.problem.tie_gauge(&self.linearised_at.frames, normal);
     }
 
-    /// The scores of patches of the wall at the unknowns. The gradients of its blocks are taken
-    /// from the linearisation.
-    ///
-    /// # Errors
-    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
-    pub fn take_patch_scores(&mut self) -> Result<PatchScores, ProblemError> {
-        let from_to = (&self.linearised_at, &self.unknowns);
-        let gradients = self
-            .problem
-            .take_block_gradients(&mut self.linearisation, from_to)?;
-        Ok(self.problem.patch_scores(&gradients))
+    /// The scores of patches of the wall, whose gradients are taken from the linearisation: a step
+    /// within the tolerance hardly changes their scatter.
+    pub fn take_patch_scores(&mut self) -> PatchScores {
+        let gradients = std::mem::take(&mut self.linearisation.block_gradients);
+        self.problem.patch_scores(&gradients)
     }
 
     /// Gives back the memory of the normal matrix, once the uncertainty is known.

@@ -30,6 +30,7 @@ impl TileWorkspace {
         let mean = self.mean();
         let n = self.frames.len();
         self.sorted.clear();
+        self.sorted.reserve(n);
         for frame in &self.frames {
             let mut values = frame.values;
             if self.has_gaps {

@@ -313,7 +313,7 @@ mod tests {
         let circle = Circle::new(3.0).unwrap();
         let grid = WallGrid::new(&circle, 3.0 / camera().fy, 1.0);
         let frames = turned(images);
-        let (mut histogram, mut spectrum) = (NoiseHistogram::default(), TextureSpectrum::default());
+        let mut histogram = NoiseHistogram::default();
         let mut workspace = TileWorkspace::default();
         for points in tiles(&grid, &circle) {
             let observations = frames.iter().map(|frame| TileObservation {
@@ -321,7 +321,7 @@ mod tests {
                 pixels: 1.0,
                 shade: 1.0,
             });
-            workspace.count_residuals(&points, observations, &mut histogram, &mut spectrum);
+            workspace.count_residuals(&points, observations, &mut histogram);
         }
         (histogram.fit().floor / SAMPLE_SHARE).sqrt()
     }
@@ -368,7 +368,8 @@ mod tests {
             let (mut histogram, mut spectrum) =
                 (NoiseHistogram::default(), TextureSpectrum::default());
             for points in &tiles {
-                workspace.count_residuals(points, observations(), &mut histogram, &mut spectrum);
+                workspace.count_residuals(points, observations(), &mut histogram);
+                workspace.add_to_spectrum(&mut spectrum);
             }
             let denoiser = spectrum.denoiser();
             let mut slopes = |denoiser: Option<&Denoiser>| {

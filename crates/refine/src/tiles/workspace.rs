@@ -62,6 +62,7 @@ impl TileWorkspace {
         observations: impl Iterator<Item = TileObservation<'a>>,
     ) {
         self.frames.clear();
+        self.frames.reserve_exact(observations.size_hint().0);
         self.has_gaps = false;
         for observation in observations {
             self.frames.push(FrameValues {
