@@ -93,19 +93,25 @@ impl Linearisation {
     ) -> (f64, Vec<FrameStep>, Kappa) {
         let mut product = pattern.product(&self.normal.blocks, step);
         let mut shared_product = Kappa::zeros();
-        let gradient = &self.normal.gradient;
-        let mut slope: f64 = gradient.iter().zip(step).map(|(g, step)| g.dot(step)).sum();
         if let Some(border) = &self.border {
             for ((block, product), step) in border.frames.iter().zip(&mut product).zip(step) {
                 *product += block * shared;
                 shared_product += block.tr_mul(step);
             }
             shared_product += border.own * shared;
-            slope += border.gradient.dot(shared);
         }
         let products = product.iter().zip(step);
         let square: f64 = products.map(|(p, s)| p.dot(s)).sum::<f64>() + shared_product.dot(shared);
+        let slope = self.slope(step, shared);
         (slope + 0.5 * square, product, shared_product)
+    }
+
+    /// The derivative of the cost along a step of all slots and of the shared parameters: `gᵀδ`.
+    pub fn slope(&self, step: &[FrameStep], shared: &Kappa) -> f64 {
+        let gradient = &self.normal.gradient;
+        let of_slots: f64 = gradient.iter().zip(step).map(|(g, step)| g.dot(step)).sum();
+        let border = self.border.as_ref();
+        of_slots + border.map_or(0.0, |border| border.gradient.dot(shared))
     }
 
     /// The step of all slots and of the shared parameters by a factor of the normal matrix that is

@@ -32,7 +32,7 @@
 
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
-use crate::parameters::frame_estimate::{FrameStep, POSE_PARAMETERS};
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep, POSE_PARAMETERS};
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::block_sums::BlockSums;
 use crate::problem::linearisation::{BlockGradient, Linearisation};
@@ -224,6 +224,37 @@ impl PhotometricProblem<'_> {
             let fixed = (0..SHARED_PARAMETERS).filter(|k| !calibration.has_equations(*k));
             fixed.for_each(|k| border.remove(k));
         }
+    }
+
+    /// The gradients of all blocks of the wall at the unknowns `to`; `at`: the equations at the
+    /// unknowns `from`, whose own gradients of blocks are taken. A step within
+    /// [`MAX_ERROR_SIGMA`] hardly changes their scatter.
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
+    pub fn take_block_gradients(
+        &self,
+        at: &mut Linearisation,
+        (from, to): (&Unknowns, &Unknowns),
+    ) -> Result<Vec<BlockGradient>, ProblemError> {
+        let mut gradients = std::mem::take(&mut at.block_gradients);
+        let (step, shared) = from.local(to);
+        let unknowns = (FRAME_PARAMETERS * from.frames.len()) as f64;
+        if -at.slope(&step, &shared) < MAX_ERROR_SIGMA.powi(2) * unknowns {
+            return Ok(gradients);
+        }
+        let moved = self.wall_step_px(&from.frames, &step, &shared);
+        let step_px = moved.into_iter().fold(0.0, f64::max);
+        let Some(stride) = self.change_share(at, step_px) else {
+            drop(gradients);
+            return Ok(self.linearise_at(to)?.block_gradients);
+        };
+        for (unknowns, factor) in [(from, -1.0), (to, 1.0)] {
+            self.visit_share(unknowns, TileShare::OneIn(stride), &mut |k, part| {
+                gradients[k].add(&part.gradient(), factor * stride as f64);
+            })?;
+        }
+        Ok(gradients)
     }
 
     /// Visits a share of the tiles of every block, with the index of the block.

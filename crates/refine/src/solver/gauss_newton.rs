@@ -57,11 +57,17 @@ impl Solution<'_> {
         self.problem.tie_gauge(&self.linearised_at.frames, normal);
     }
 
-    /// The scores of patches of the wall, whose gradients are taken from the linearisation: a step
-    /// within the tolerance hardly changes their scatter.
-    pub fn take_patch_scores(&mut self) -> PatchScores {
-        let gradients = std::mem::take(&mut self.linearisation.block_gradients);
-        self.problem.patch_scores(&gradients)
+    /// The scores of patches of the wall at the unknowns. The gradients of its blocks are taken
+    /// from the linearisation.
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
+    pub fn take_patch_scores(&mut self) -> Result<PatchScores, ProblemError> {
+        let from_to = (&self.linearised_at, &self.unknowns);
+        let gradients = self
+            .problem
+            .take_block_gradients(&mut self.linearisation, from_to)?;
+        Ok(self.problem.patch_scores(&gradients))
     }
 
     /// Gives back the memory of the normal matrix, once the uncertainty is known.
@@ -285,7 +291,7 @@ impl DampedGaussNewton {
             let all_feasible = hold_infeasible_frames(problem, frames, &mut step);
             let moved = problem.wall_step_px(frames, &step, &shared);
             let step_px = moved.into_iter().fold(0.0, f64::max);
-            let decrement = -slope(&step, &shared, &current);
+            let decrement = -current.slope(&step, &shared);
             let stop = self.reason_to_stop(step_px, decrement, FRAME_PARAMETERS * frames.len());
             if stop.is_some() && self.lambda > 0.0 {
                 // It is the damping that makes the step short.
@@ -317,7 +323,7 @@ impl DampedGaussNewton {
                 }
                 None => problem.linearise_at(&candidate)?,
             };
-            let left = slope(&step, &shared, &next);
+            let left = next.slope(&step, &shared);
             let settles = step_px < problem.pixel_px()
                 && left.abs() < (1.0 - MIN_SLOPE_REDUCTION) * decrement
                 && next.cost < (1.0 + MAX_COST_RISE) * current.cost;
@@ -326,7 +332,7 @@ impl DampedGaussNewton {
                 // An undamped step is δ = −α H⁻¹ g, with its length α.
                 let is_whole = self.lambda == 0.0 && all_feasible;
                 let curvature = |before: f64, after: f64| (1.0 - after / before) / length;
-                let of_poses = |at| slots_slope(&step[..frames.len()], at, POSE_PARAMETERS);
+                let of_poses = |at| pose_slope(&step[..frames.len()], at);
                 record.curvature = is_whole.then(|| curvature(of_poses(&current), of_poses(&next)));
                 self.decrement = is_whole.then_some(decrement);
                 self.steps.push(record);
@@ -445,19 +451,14 @@ fn hold_infeasible_frames(
     all_feasible
 }
 
-/// The derivative of the cost along the first `unknowns` of the step of each slot: `δᵀ g`.
-fn slots_slope(step: &[FrameStep], at: &Linearisation, unknowns: usize) -> f64 {
-    let slots = step.iter().zip(&at.normal.gradient);
-    let slopes =
-        slots.map(|(step, gradient)| step.rows(0, unknowns).dot(&gradient.rows(0, unknowns)));
+/// The derivative of the cost along the poses of a step of the frames.
+fn pose_slope(step: &[FrameStep], at: &Linearisation) -> f64 {
+    let frames = step.iter().zip(&at.normal.gradient);
+    let slopes = frames.map(|(step, gradient)| {
+        let [step, gradient] = [step, gradient].map(|of| of.fixed_rows::<POSE_PARAMETERS>(0));
+        step.dot(&gradient)
+    });
     slopes.sum()
-}
-
-/// The derivative of the cost along a whole step, that of the shared unknowns included.
-fn slope(step: &[FrameStep], shared: &Kappa, at: &Linearisation) -> f64 {
-    let border = at.border.as_ref();
-    let of_shared = border.map_or(0.0, |border| shared.dot(&border.gradient));
-    slots_slope(step, at, FRAME_PARAMETERS) + of_shared
 }
 
 #[cfg(test)]

@@ -27,8 +27,9 @@ const BEND: Range<usize> = BEND_INDEX..BEND_INDEX + BEND_PARAMETERS;
 /// Rate at which a scale of no use is kept until the dense solves, which see more than the ones
 /// before.
 const KEPT_RATE: f64 = 0.3;
-/// Factor by which a strength may change without a new solve; the estimate hardly depends on it.
-const MAX_STRENGTH_CHANGE: f64 = 1.3;
+/// Factor by which a strength, or the information of pixels against it, may change without a new
+/// solve; the estimate hardly depends on it.
+pub const MAX_STRENGTH_CHANGE: f64 = 1.3;
 
 /// Begins to estimate the shape, and the lens with it, if the options ask for it.
 ///

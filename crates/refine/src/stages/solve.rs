@@ -100,7 +100,7 @@ pub fn run<'a>(
         let dispersion = uncertainty.dispersion();
         if is_close_for_finer(&plan, setup, &context, state)? {
             plan_again(&plan, setup.options, state);
-        } else if state.dispersion == 1.0 && dispersion > 1.0 {
+        } else if state.dispersion == 1.0 && dispersion > shape::MAX_STRENGTH_CHANGE {
             state.dispersion = dispersion;
             plan_again(&plan, setup.options, state);
         } else {

@@ -27,8 +27,8 @@
 //! A residual that errs with its neighbours tells less than one that errs by itself: by the factor
 //! c_P, or c_1 if all is noise, as where compression makes errors that are not independent. With
 //! all of its information the pixels would outweigh a prior that is right, and be taken for
-//! evidence of a deformed wall. So if the factor is above 1, the last solve is repeated with the
-//! information of pixels divided by it
+//! evidence of a deformed wall. So if the factor is more than slightly above 1, the last solve is
+//! repeated with the information of pixels divided by it
 //! ([`crate::model::context::EstimationContext::dispersion`]).
 //!
 //! What moves all scores of a frame alike (an error that its six unknowns absorb) leaves no trace

@@ -58,7 +58,7 @@ impl SolutionUncertainty {
         alpha: f64,
     ) -> Result<Self, ProblemError> {
         let scatter = solution.problem.score_scatter(&solution.linearisation);
-        let finest = solution.take_patch_scores();
+        let finest = solution.take_patch_scores()?;
         let frames = solution.unknowns.frames.len();
         let at_end = (&solution.linearisation, &solution.linearised_at);
         let (problem, unknowns) = (&solution.problem, &solution.unknowns);
