@@ -66,6 +66,7 @@
 //! | sparse normal equations, s eliminated | [`normal_equations`] |
 //! | priors of the unknowns | [`priors`] |
 //! | reweighting, result and its significance | [`calibration`] |
+//! | light that moves with the camera, and the evidence for a lamp | [`light_model`] |
 //!
 //! Source: D. J. Fixsen, S. H. Moseley and R. G. Arendt, "Calibrating array detectors",
 //! Astrophysical Journal Supplement 128, 2000 (flat fields from pictures that show the same sky in
@@ -74,11 +75,13 @@
 //! Models", Wiley 1987, §1.1.
 
 mod calibration;
+mod light_model;
 mod normal_equations;
 mod observation;
 mod priors;
 mod robust_weights;
 
 pub use calibration::PhotometricCalibration;
+pub use light_model::{LightModel, MAX_LIGHT_FRAMES, ObservedPoint, light_frames};
 pub use observation::Observation;
 pub use priors::Priors;

@@ -59,6 +59,21 @@ impl Observation {
         }
     }
 
+    /// The observation as one of another frame.
+    pub fn in_frame(self, frame: usize) -> Self {
+        Self { frame, ..self }
+    }
+
+    /// The observation in a light whose logarithm `log_light` there is known, too.
+    pub fn in_light(self, log_light: f64) -> Self {
+        let light = log_light.exp();
+        Self {
+            value: (f64::from(self.value) / light) as f32,
+            factor: (f64::from(self.factor) * light) as f32,
+            ..self
+        }
+    }
+
     /// Regressors of the light: `B_k`, then the lamp's.
     fn terms(&self, size: (usize, usize)) -> [f64; LIGHT_TERMS] {
         let shading = shading_terms(&self.pixel(), size);

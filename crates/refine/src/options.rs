@@ -1,6 +1,7 @@
 //! Options of a refinement.
 
 use tunnelstitch_core::survey::CalibrationGroup;
+use tunnelstitch_geometry::numerics::significance::FALSE_ALARM_RATE;
 
 /// Treatment of the wall's shape.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -90,7 +91,7 @@ impl Default for RefineOptions {
             outlier_mask_density: None,
             joint: false,
             max_sigma_px: 0.25,
-            false_alarm_rate: 1e-3,
+            false_alarm_rate: FALSE_ALARM_RATE,
             cache_bytes: 2 << 30,
             max_iterations: 20,
             step_tolerance_px: 0.0005,

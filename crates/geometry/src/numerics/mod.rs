@@ -9,6 +9,7 @@
 //! | a function of every element, on all threads | [`parallel`] |
 //! | rounding of small numbers without casts | [`rounding`] |
 //! | sinc and Hann's window | [`signal`] |
+//! | quantiles for tests with a rate of false alarms | [`significance`] |
 //! | two-dimensional Fourier transforms | [`spectrum`] |
 //! | loops compiled for the widest vectors of the processor | [`simd_dispatch`] |
 
@@ -18,5 +19,6 @@ pub mod monotone;
 pub mod parallel;
 pub mod rounding;
 pub mod signal;
+pub mod significance;
 pub mod simd_dispatch;
 pub mod spectrum;

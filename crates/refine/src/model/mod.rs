@@ -15,4 +15,4 @@ pub mod prior;
 pub mod prior_terms;
 pub mod problem_error;
 pub mod rejection;
-pub mod significance;
+pub use tunnelstitch_geometry::numerics::significance;

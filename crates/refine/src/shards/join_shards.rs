@@ -25,6 +25,7 @@ use crate::stages::plan::Stage;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::{GlobalSolve, PipelineState, Snapshot};
+use crate::tracking::light_model::take_over;
 use crate::uncertainty::observability::UnobservableParameter;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -166,7 +167,7 @@ fn joined_snapshot(
         JoinedLight::Even => setup.frames.set_light(Light::Even),
         JoinedLight::Normalised => setup.frames.set_light(Light::Normalised),
         JoinedLight::Shaded(light) => {
-            light.take_over(&setup.context(&state), &state.frames.estimates);
+            take_over(*light, &setup.context(&state), &state.frames.estimates);
         }
     }
     for unobservable in states().flat_map(|state| &state.unobservable) {

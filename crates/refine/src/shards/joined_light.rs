@@ -1,8 +1,8 @@
 //! The light of all stretches.
 
 use crate::error::RefineError;
-use crate::tracking::light_model::LightModel;
 use tunnelstitch_core::frames::{Lamp, Light, SHADING_TERMS, Shading};
+use tunnelstitch_photometry::LightModel;
 
 /// The treatment of the light in all stretches, as far as it does not depend on poses.
 pub enum JoinedLight {

@@ -6,6 +6,7 @@ use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
 use crate::tracking::first_light::first_light;
+use crate::tracking::light_model::take_over;
 use crate::tracking::prescreening;
 use tunnelstitch_core::frames::Light;
 
@@ -24,7 +25,7 @@ pub fn run<'a>(
     if let (Light::Even, Some(mean)) = (setup.frames.light(), &prescreened.mean)
         && let Some(light) = first_light(&context, mean, coarsest, setup.options.false_alarm_rate)
     {
-        light.take_over(&context, &[]);
+        take_over(light, &context, &[]);
     }
     estimation.state.noise = prescreened.noise;
     estimation.state.frames.rejections = prescreened.rejections;

@@ -23,11 +23,11 @@ use crate::solver::stopping::Stopping;
 use crate::thresholds::alternating_calibration::{MAX_CHANGE_RATIO, MAX_SHADING_CHANGE};
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::shading_correction::correct_until_settled;
-use crate::tracking::tile_views::MAX_SHADING_FRAMES;
 use crate::tracking::track::Tracking;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_photometry::MAX_LIGHT_FRAMES;
 
 /// Points on each edge of the picture at which cameras are compared.
 const STEPS_PER_EDGE: usize = 4;
@@ -66,7 +66,7 @@ impl AlternatingCalibration {
         progress: &dyn Progress,
     ) -> Result<bool, ProblemError> {
         let mut least_change = f64::INFINITY;
-        let frames = self.rejections.len().min(MAX_SHADING_FRAMES);
+        let frames = self.rejections.len().min(MAX_LIGHT_FRAMES);
         for _ in 0..MAX_TRACKING_ITERATIONS {
             let Some(before) = context.frames.camera_light() else {
                 return Ok(true);

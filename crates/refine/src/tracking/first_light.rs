@@ -7,13 +7,13 @@
 
 use crate::model::context::EstimationContext;
 use crate::thresholds::correlation_search::SAMPLES_PER_INDEPENDENT_PIECE;
-use crate::tracking::light_model::LightModel;
 use nalgebra::Vector2;
 use tunnelstitch_core::frames::{GreyImage, Lamp, MeanShading, Shading};
 use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::mean_radius_m;
 use tunnelstitch_geometry::trajectory::Pose;
+use tunnelstitch_photometry::LightModel;
 
 /// Frames whose falloffs make that of the mean: their poses differ by the jitter only.
 const MEAN_FRAMES: usize = 12;

@@ -1,20 +1,18 @@
 //! Search for a lamp that moves with the camera.
 //!
-//! The lamp lights the wall by its distance, and so by the frame's pose ([`Lamp`]): what frames off
-//! the axis show tells it from a shading that all have in common, once their poses are good.
+//! The lamp lights the wall by its distance, and so by the frame's pose
+//! ([`tunnelstitch_core::frames::Lamp`]): what frames off the axis show tells it from a shading
+//! that all have in common, once their poses are good ([`tunnelstitch_photometry::LightModel`]).
 
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
-use crate::model::significance::chi_squared_bounds;
 use crate::options::RefineOptions;
-use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
-use crate::tracking::light_model::LightModel;
-use crate::tracking::tile_views::{TileViews, calibrated_frames};
-use tunnelstitch_core::frames::{LAMP_TERMS, Lamp, Light, NoiseMeasurement, PictureNoise};
+use crate::tracking::light_model::{present_light, take_over};
+use crate::tracking::tile_views::TileViews;
+use tunnelstitch_core::frames::{Light, NoiseMeasurement, PictureNoise};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-use tunnelstitch_geometry::surface::mean_radius_m;
-use tunnelstitch_photometry::PhotometricCalibration;
+use tunnelstitch_photometry::light_frames;
 
 /// Looks for a lamp that moves with the camera, at the frames' present poses, and takes it over if
 /// frames agree better with one beside a shading than with a shading alone, by more than chance,
@@ -30,7 +28,7 @@ pub fn find_lamp(
 ) -> Result<Option<PictureNoise>, ProblemError> {
     let before = context.frames.light();
     let is_normalised = matches!(before, Light::Normalised);
-    let dark = LightModel::present(context);
+    let dark = present_light(context);
     let views = if is_normalised {
         context.frames.set_light(Light::Even);
         let mut seen = frames.clone();
@@ -40,10 +38,11 @@ pub fn find_lamp(
         TileViews::observe(context, options, frames)?
     };
     let noise = median_noise(context)?;
-    let lamp = lamp_beside(dark, &views, context, options);
+    let (surface, rate) = (context.surface.as_ref(), options.false_alarm_rate);
+    let lamp = dark.with_lamp(&views.points, &views.poses, surface, rate);
     match lamp.filter(|(_, found)| found.variance.sqrt() < noise.fine) {
         Some((light, _)) => {
-            light.take_over(context, &frames.estimates);
+            take_over(light, context, &frames.estimates);
             Ok(Some(noise))
         }
         None => {
@@ -56,31 +55,9 @@ pub fn find_lamp(
     }
 }
 
-/// The lamp by which frames agree best, with its calibration; None if they do as well without, in
-/// a light as `dark`.
-fn lamp_beside(
-    dark: LightModel,
-    views: &TileViews,
-    context: &EstimationContext,
-    options: &RefineOptions,
-) -> Option<(LightModel, PhotometricCalibration)> {
-    let (_, without) = dark.refined(views, false)?;
-    let at_camera = LightModel {
-        lamp: Some(Lamp::at_camera(mean_radius_m(context.surface.as_ref()))),
-        ..dark
-    };
-    let mut lit = at_camera.refined(views, true)?;
-    for _ in 1..MAX_TRACKING_ITERATIONS {
-        lit = lit.0.refined(views, true)?;
-    }
-    let gain = views.independent() * (without.variance / lit.1.variance).ln();
-    let (_, least) = chi_squared_bounds(2.0 * options.false_alarm_rate, LAMP_TERMS as f64)?;
-    (gain > least).then_some(lit)
-}
-
 /// Median noise of the frames that the light is estimated from.
 fn median_noise(context: &EstimationContext) -> Result<PictureNoise, ProblemError> {
-    let frames: Vec<usize> = calibrated_frames(context.frames.frames()).collect();
+    let frames: Vec<usize> = light_frames(context.frames.frames()).collect();
     let noises = frames.par_map(|k| Ok(NoiseMeasurement::of(&*context.frames.get(*k)?)));
     let noises: Vec<Option<NoiseMeasurement>> =
         noises.into_iter().collect::<Result<_, ProblemError>>()?;
@@ -96,7 +73,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
-    use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
+    use tunnelstitch_core::frames::{FrameCache, GreyImage, Lamp, Pyramid};
     use tunnelstitch_core::test_wall::{TestWall, waves};
     use tunnelstitch_geometry::surface::Surface;
     use tunnelstitch_geometry::trajectory::{Pose, spiral};

@@ -17,7 +17,7 @@ use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::solver::solve_levels::solve_levels;
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
-use crate::tracking::light_model::LightModel;
+use crate::tracking::light_model::{present_light, take_over};
 use crate::tracking::tile_views::TileViews;
 use nalgebra::Vector2;
 use tunnelstitch_core::frames::Light;
@@ -83,15 +83,15 @@ fn correct(
         Light::Even => MIN_SIGNIFICANCE_SIGMA,
         Light::Normalised => return false,
     };
-    let before = LightModel::present(context);
-    let Some((after, found)) = before.refined(views, moves_lamp) else {
+    let before = present_light(context);
+    let Some((after, found)) = before.refined(&views.points, &views.poses, moves_lamp) else {
         return false;
     };
     let is_changed = found.is_light_significant(sigmas, moves_lamp && before.lamp.is_some());
     if is_changed {
-        after.take_over(context, &frames.estimates);
+        take_over(after, context, &frames.estimates);
     } else if before.lamp.is_some() {
-        before.take_over(context, &frames.estimates);
+        take_over(before, context, &frames.estimates);
     }
     is_changed
 }

@@ -26,6 +26,8 @@ pub struct Budget {
     pub grid_step_px: f64,
     /// Observations of wall points for exposures, before bands are drawn.
     pub exposure: u64,
+    /// The light over every frame, if there is a lamp.
+    pub light: u64,
     /// The band being drawn and written.
     pub band: u64,
     /// Memory of the output until it is finished.
@@ -92,7 +94,7 @@ impl Budget {
         threads: usize,
     ) -> Result<Self, RenderError> {
         let format = frames.format();
-        let (mut thumbnails, mut grid, mut exposure) = (0, 0, 0);
+        let (mut thumbnails, mut grid, mut exposure, mut light) = (0, 0, 0, 0);
         if options.needs_thumbnails() {
             let nodes = seam_grid::grid(canvas);
             grid = nodes.pixels() as u64 * Seams::bytes_per_node(format.channels);
@@ -100,6 +102,7 @@ impl Budget {
             let size = frames.cameras().size();
             thumbnails = Thumbnails::bytes(size, level, format.channels, frames.len());
             exposure = Exposure::solve_bytes(placements, canvas);
+            light = Exposure::light_bytes(frames.len());
         }
         let rows = BAND_ROWS.min(canvas.rows);
         let pixel = format.pixel_bytes(true) as u64 + 4;
@@ -118,6 +121,7 @@ impl Budget {
             grid,
             grid_step_px: seam_grid::node_spacing_px(canvas),
             exposure,
+            light,
             band,
             output,
             decoding,
@@ -157,17 +161,21 @@ impl Budget {
 
     /// Memory while exposures and seams are found, bytes.
     pub(crate) fn settling(&self) -> u64 {
-        self.thumbnails + self.grid + self.exposure + self.decoding + self.room
+        let finding = self.thumbnails + self.grid + self.exposure;
+        // Once more for the thumbnails.
+        finding + 2 * self.light + self.decoding + self.room
     }
 
     /// Memory while bands are drawn with exposures and seams that were found before, bytes.
     pub(crate) fn drawing(&self) -> u64 {
-        self.grid + self.band + self.output + self.decoding + self.readings + self.room
+        let drawing = self.grid + self.light + self.band + self.output;
+        drawing + self.decoding + self.readings + self.room
     }
 
     /// Memory beside that of frames and of observations for exposures, bytes.
     fn fixed(&self) -> u64 {
-        self.thumbnails + self.grid + self.band + self.output + self.decoding + self.readings
+        let kept = self.thumbnails + self.grid + 2 * self.light;
+        kept + self.band + self.output + self.decoding + self.readings
     }
 }
 

@@ -1,12 +1,13 @@
 //! Exposure of the frames, and its removal.
 //!
 //! A frame i shows `I = a_i V(u, v) S + b_i` of the evenly lit wall S: gain a and bias b are the
-//! frame's own, V is the shading of lamp and lens, the same in all frames ([`Shading`]). They are
-//! calibrated by wall points all over the panorama ([`tunnelstitch_photometry`]), with nothing
-//! known beforehand: `a = e^α`, `b = β`, `ln V = Σ c_k B_k`.
+//! frame's own, V is the light that moves with the camera: a shading that all frames have in common
+//! and, if there is evidence for one, a lamp that lights the wall by its distance ([`LightModel`],
+//! as `refine` models it). They are calibrated by wall points all over the panorama
+//! ([`tunnelstitch_photometry`]), with nothing known beforehand: `a = e^α`, `b = β`.
 //!
-//! A common factor of gains and wall cannot be observed. It is fixed twice over: V is 1 where it is
-//! brightest, and the gains are 1 in the (geometric) mean.
+//! A common factor of gains and wall cannot be observed. It is fixed twice over: the shading is 1
+//! where it is brightest, and the gains are 1 in the (geometric) mean.
 
 use super::patch_light::PatchLight;
 use super::photometric_samples::observe_points;
@@ -19,10 +20,13 @@ use crate::warp::patches::PATCH_SCALE;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
-use tunnelstitch_core::frames::Shading;
+use tunnelstitch_core::frames::CameraLight;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::significance::FALSE_ALARM_RATE;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_geometry::surface::Surface;
-use tunnelstitch_photometry::{PhotometricCalibration, Priors};
+use tunnelstitch_geometry::trajectory::Pose;
+use tunnelstitch_photometry::{LightModel, Observation, ObservedPoint, light_frames};
 
 /// Wall points a frame.
 const POINTS_PER_FRAME: usize = 40;
@@ -35,7 +39,7 @@ const OBSERVATION_BYTES: f64 = 96.0;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Exposure {
     frames: Vec<FrameExposure>,
-    shading: Option<Table>,
+    light: LightTables,
     /// Full scale of the frames over 255.
     scale: f32,
 }
@@ -59,7 +63,7 @@ impl Exposure {
         };
         Self {
             frames: vec![own; frames],
-            shading: None,
+            light: LightTables::default(),
             scale: 1.0,
         }
     }
@@ -76,19 +80,17 @@ impl Exposure {
     ) -> Self {
         let count = placements.len();
         let grid = grid_of_points(canvas, count);
-        let size = thumbnails.full_size();
-        let even = Shading::none(size);
         let points = observe_points(surface, thumbnails, placements, &grid);
-        let priors = Priors::default();
-        let Some(found) = PhotometricCalibration::solve(&points, count, &even, None, &priors)
-        else {
+        let poses: Vec<Pose> = placements.iter().map(|placement| placement.pose).collect();
+        let start = first_light(surface, thumbnails.full_size(), &points, &poses);
+        let found = start.refined(&points, &poses, start.lamp.is_some());
+        let Some((light, found)) = found else {
             return Self {
                 scale: white / 255.0,
                 ..Self::none(count)
             };
         };
-        let shading = even.changed(&found.shading);
-        let brightest = shading.range()[1];
+        let light = light.over(surface, thumbnails.full_cameras(), &poses);
         let mean_log = found.log_gains.iter().sum::<f64>() / count as f64;
         let own = found.log_gains.iter().zip(&found.biases);
         let frames = own.map(|(log_gain, bias)| FrameExposure {
@@ -97,7 +99,7 @@ impl Exposure {
         });
         Self {
             frames: frames.collect(),
-            shading: Some(Table::new(&shading, brightest, size)),
+            light: LightTables::new(&light),
             scale: white / 255.0,
         }
     }
@@ -110,7 +112,15 @@ impl Exposure {
             (footprint.s_max_m - footprint.s_min_m) * (footprint.h_max_m - footprint.h_min_m)
         };
         let area_m2: f64 = placements.iter().map(area_m2).sum();
-        (OBSERVATION_BYTES * points_per_m * points_per_m * area_m2) as u64
+        ((OBSERVATION_BYTES + size_of::<Observation>() as f64)
+            * points_per_m
+            * points_per_m
+            * area_m2) as u64
+    }
+
+    /// Memory of a light that differs from frame to frame, bytes.
+    pub fn light_bytes(frames: usize) -> u64 {
+        (frames * NODES.0 * NODES.1 * size_of::<f32>()) as u64
     }
 
     /// The frames' gains and biases.
@@ -124,22 +134,36 @@ impl Exposure {
         Response {
             gain: (1.0 / gain) as f32,
             bias: bias as f32 * self.scale,
-            shading: self.shading.as_ref(),
+            light: self.light.of(frame),
         }
     }
 
     /// The exposure of the thumbnails of the same frames, which are 16 bits deep.
     pub fn of_thumbnails(&self, thumbnails: &Thumbnails) -> Self {
-        let shading = self.shading.clone().map(|table| Table {
-            offset: table.scale.map(|s| s * thumbnails.full(0.0)),
-            scale: table.scale.map(|s| s * thumbnails.scale()),
-            ..table
-        });
         Self {
             frames: self.frames.clone(),
-            shading,
+            light: self.light.of_thumbnails(thumbnails),
             scale: u16::WHITE / 255.0,
         }
+    }
+}
+
+/// The light of pictures of `size` before any shading is known: even, or that of a lamp, if the
+/// middle frames give evidence for one.
+fn first_light(
+    surface: &dyn Surface,
+    size: (usize, usize),
+    points: &[ObservedPoint],
+    poses: &[Pose],
+) -> LightModel {
+    let even = LightModel::even(size);
+    let middle = light_frames(poses.len());
+    let seen = points.iter().map(|point| point.by(&middle));
+    let seen: Vec<ObservedPoint> = seen.filter(|point| point.seen.len() > 1).collect();
+    let lit = even.with_lamp(&seen, &poses[middle], surface, FALSE_ALARM_RATE);
+    LightModel {
+        lamp: lit.and_then(|(light, _)| light.lamp),
+        ..even
     }
 }
 
@@ -153,13 +177,13 @@ fn grid_of_points(canvas: &Canvas, frames: usize) -> Canvas {
 pub struct Response<'a> {
     gain: f32,
     bias: f32,
-    shading: Option<&'a Table>,
+    light: Option<&'a Table>,
 }
 
 impl Response<'_> {
     /// True if there is nothing to undo.
     pub fn is_none(&self) -> bool {
-        self.shading.is_none() && self.gain == 1.0 && self.bias == 0.0
+        self.light.is_none() && self.gain == 1.0 && self.bias == 0.0
     }
 
     /// The bias, which is taken away before values are multiplied by the light.
@@ -173,7 +197,7 @@ impl Response<'_> {
         if self.is_none() {
             return None;
         }
-        let Some(table) = self.shading else {
+        let Some(table) = self.light else {
             return Some(PatchLight::even(self.gain));
         };
         let at = |[u, v]: [f32; 2]| self.gain * table.at(u, v);
@@ -213,7 +237,7 @@ impl Response<'_> {
             return;
         }
         let (u, v, seen, values) = batch.parts();
-        let Some(table) = self.shading else {
+        let Some(table) = self.light else {
             for value in values[columns].as_flattened_mut() {
                 *value = self.undone(*value, self.gain);
             }
@@ -253,7 +277,7 @@ impl Response<'_> {
 
     /// The value of the evenly lit wall for one of the frame at a pixel.
     pub fn wall(&self, value: f32, u: f32, v: f32) -> f32 {
-        let light = self.shading.map_or(1.0, |table| table.at(u, v));
+        let light = self.light.map_or(1.0, |table| table.at(u, v));
         self.undone(value, self.gain * light)
     }
 
@@ -269,6 +293,46 @@ const STEP: usize = 8;
 /// Nodes of [`Table`] across and down.
 const NODES: (usize, usize) = (65, 49);
 
+/// `1/V` over every frame.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct LightTables {
+    /// One of each frame, or one that all have in common; none if the light is even.
+    tables: Vec<Table>,
+}
+
+impl LightTables {
+    /// The tables of a light whose shading is to be 1 where it is brightest.
+    fn new(light: &CameraLight) -> Self {
+        let brightest = light.shading.range()[1].ln();
+        let count = (light.lamp.as_ref()).map_or(1, |(_, falloffs)| falloffs.len());
+        let table = |frame| {
+            Table::new(light.shading.size(), |at| {
+                (brightest - light.log_at(frame, at)).exp()
+            })
+        };
+        Self {
+            tables: (0..count).par_map(table),
+        }
+    }
+
+    /// The table of a frame.
+    fn of(&self, frame: usize) -> Option<&Table> {
+        self.tables.get(frame).or(self.tables.first())
+    }
+
+    /// The tables of the thumbnails of the same frames.
+    fn of_thumbnails(&self, thumbnails: &Thumbnails) -> Self {
+        let tables = self.tables.iter().cloned().map(|table| Table {
+            offset: table.scale.map(|s| s * thumbnails.full(0.0)),
+            scale: table.scale.map(|s| s * thumbnails.scale()),
+            ..table
+        });
+        Self {
+            tables: tables.collect(),
+        }
+    }
+}
+
 /// `1/V` at nodes spread over a picture; bilinear between them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Table {
@@ -280,14 +344,15 @@ struct Table {
 }
 
 impl Table {
-    fn new(shading: &Shading, brightest: f64, size: (usize, usize)) -> Self {
+    /// Tabulates `inverse`, the factor that undoes the light at a pixel, over pictures of `size`.
+    fn new(size: (usize, usize), inverse: impl Fn(&Vector2<f64>) -> f64 + Copy) -> Self {
         let last = |size: usize| (size.max(2) - 1) as f64;
         let pixel =
             |k: usize, nodes: usize, size: usize| k as f64 / (nodes - 1) as f64 * last(size);
         let values = (0..NODES.1).flat_map(|j| {
             (0..NODES.0).map(move |i| {
                 let at = Vector2::new(pixel(i, NODES.0, size.0), pixel(j, NODES.1, size.1));
-                (brightest / shading.at(&at)) as f32
+                inverse(&at) as f32
             })
         });
         let scale = |nodes: usize, size: usize| ((nodes - 1) as f64 / last(size)) as f32;

@@ -8,7 +8,7 @@ use crate::layout::tiles::{EDGE, Tile, tiles};
 use crate::warp::projection::LocalPoints;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
-use tunnelstitch_photometry::Observation;
+use tunnelstitch_photometry::{Observation, ObservedPoint};
 
 /// Observes the points of `grid` that at least two frames show in the thumbnails, with nothing
 /// known of gain, bias and shading.
@@ -17,7 +17,7 @@ pub fn observe_points(
     thumbnails: &Thumbnails,
     placements: &[Placement],
     grid: &Canvas,
-) -> Vec<Vec<Observation>> {
+) -> Vec<ObservedPoint> {
     let bands = tiles(surface, grid, placements, EDGE);
     let tiles: Vec<Tile> = bands.into_iter().flatten().collect();
     let found = tiles.par_map(|tile| observe_tile(surface, thumbnails, placements, grid, tile));
@@ -31,7 +31,7 @@ fn observe_tile(
     placements: &[Placement],
     grid: &Canvas,
     tile: &Tile,
-) -> Vec<Vec<Observation>> {
+) -> Vec<ObservedPoint> {
     let points = LocalPoints::new(&tile.points(surface, grid));
     let mut found: Vec<Vec<Observation>> = vec![Vec::new(); tile.pixels()];
     let columns = tile.columns as usize;
@@ -51,6 +51,16 @@ fn observe_tile(
             }
         }
     }
-    found.retain(|point| point.len() > 1);
-    found
+    let points = tile.walls(grid).zip(found);
+    let points = points.filter(|(_, seen)| seen.len() > 1);
+    points
+        .map(|(wall, seen)| {
+            let frame = surface.frame(wall);
+            ObservedPoint {
+                x_w: frame.x_w,
+                normal: frame.normal(),
+                seen,
+            }
+        })
+        .collect()
 }

@@ -18,7 +18,7 @@ use tunnelstitch_geometry::surface::Surface;
 #[derive(Clone, Debug)]
 pub struct Thumbnails {
     cameras: Cameras,
-    full_size: (usize, usize),
+    full: Cameras,
     scale: f32,
     pictures: Vec<Picture>,
     bilinear: Kernel,
@@ -50,7 +50,7 @@ impl Thumbnails {
         let cameras = frames.cameras();
         Ok(Self {
             cameras: cameras.at_level(level),
-            full_size: cameras.size().map(|side| side as usize).into(),
+            full: cameras.clone(),
             scale: (1 << level) as f32,
             bilinear: Kernel::new(Interpolation::Bilinear, 1.0),
             pictures: pictures.into_iter().collect::<Result<Vec<_>, _>>()?,
@@ -91,9 +91,14 @@ impl Thumbnails {
         &self.cameras
     }
 
+    /// The cameras of the frames.
+    pub fn full_cameras(&self) -> &Cameras {
+        &self.full
+    }
+
     /// Width and height of the frames, pixels.
     pub fn full_size(&self) -> (usize, usize) {
-        self.full_size
+        self.full.size().map(|side| side as usize).into()
     }
 
     /// Pixels of a frame along each side of a thumbnail's.

@@ -120,46 +120,6 @@ fn every_mode_covers_what_the_frames_see() {
 }
 
 #[test]
-fn gains_and_a_headlight_are_undone() {
-    let wall = TestWall::ring(test_wall::waves);
-    let (w, h) = (f64::from(wall.camera.width), f64::from(wall.camera.height));
-    let cache = changed_pictures(&wall, |k, u, v, value| {
-        let gain = 1.0 + 0.25 * (2.3 * k as f64).sin();
-        let (x, y) = (2.0 * u as f64 / w - 1.0, 2.0 * v as f64 / h - 1.0);
-        let lamp = 1.0 - 0.25 * (x * x + y * y);
-        (f64::from(value) * gain * lamp).min(255.0) as f32
-    });
-    let raw = draw(&wall, cache.clone(), 60.0, &PLAIN);
-    let (before, ..) = difference(&raw, wall.perimeter_m());
-    let lit = draw(&wall, cache, 60.0, &BEST);
-    // A common factor cannot be known.
-    let (grey, covered) = lit.grey();
-    let canvas = *lit.canvas();
-    let truth: Vec<f64> = (0..canvas.pixels())
-        .map(|k| {
-            let (row, column) = (k as u32 / canvas.columns, k as u32 % canvas.columns);
-            test_wall::waves(canvas.wall(column, row), wall.perimeter_m())
-        })
-        .collect();
-    let pairs = || {
-        let all = grey.data().iter().zip(&truth).zip(&covered);
-        all.filter(|(_, covered)| **covered)
-            .map(|((a, b), _)| (f64::from(*a), *b))
-    };
-    let factor =
-        pairs().map(|(a, b)| a * b).sum::<f64>() / pairs().map(|(a, _)| a * a).sum::<f64>();
-    let squares: f64 = pairs().map(|(a, b)| (factor * a - b).powi(2)).sum();
-    let after = (squares / pairs().count() as f64).sqrt();
-    assert!((0.9..1.1).contains(&factor), "{factor}");
-    // Once around, two frames overlap only where both are dark; turns that overlap one another tell
-    // more.
-    assert!(
-        before > 15.0 && 6.0 * after < before,
-        "{before} before, {after} after"
-    );
-}
-
-#[test]
 fn what_one_frame_alone_shows_is_left_out_where_others_see_the_wall() {
     let wall = TestWall::ring(test_wall::waves);
     // Something dark before the wall in frames that overlap at least two others there.

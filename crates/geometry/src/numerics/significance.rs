@@ -2,6 +2,9 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal};
 
+/// Probability of a false alarm in a whole survey, unless another is asked for.
+pub const FALSE_ALARM_RATE: f64 = 1e-3;
+
 /// The one-sided quantile z of the standard normal distribution that `tests` independent tests
 /// exceed with the probability `alpha` at the most (Bonferroni).
 pub fn normal_quantile(alpha: f64, tests: usize) -> f64 {
