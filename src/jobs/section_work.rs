@@ -12,7 +12,7 @@ use crate::survey::Survey;
 /// Processor time of starting the program, seconds.
 const START_S: f64 = 1.0;
 /// Memory of the program beside what it works on, bytes.
-const PROGRAM_BYTES: u64 = 24 << 20;
+const PROGRAM_BYTES: u64 = 20 << 20;
 /// Memory that a task asks for over what such tasks were measured to take.
 const MEMORY_MARGIN: f64 = 1.4;
 /// Times that a task may take as long as expected, which is right within a factor of three or so,

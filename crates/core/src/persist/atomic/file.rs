@@ -57,6 +57,8 @@ pub fn remove_file(path: &Path) -> Result<(), WriteError> {
 /// An error of the operating system; a file of that name.
 pub fn create_folder(path: &Path) -> Result<(), WriteError> {
     refuse_file(path)?;
+    // Held, so that a temporary folder that an interruption has removed is not created anew.
+    let _uninterrupted = temporary::hold_list();
     std::fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))
 }
 
