@@ -12,8 +12,7 @@ pub struct LengthUnit {
 }
 
 impl LengthUnit {
-    /// Metres.
-    pub const METRES: Self = Self::new("metres", 1.0, &["m", "metre"]);
+    const METRES: Self = Self::new("metres", 1.0, &["m", "metre"]);
 
     /// Units that are found in place of metres.
     pub const OTHERS: [Self; 5] = [

@@ -15,4 +15,3 @@ pub mod prior;
 pub mod prior_terms;
 pub mod problem_error;
 pub mod rejection;
-pub use tunnelstitch_geometry::numerics::significance;

@@ -7,8 +7,11 @@ use tunnelstitch_geometry::trajectory::Pose;
 /// Number of parameters of a frame: rotation (3), translation (3), log-gain, bias.
 pub const FRAME_PARAMETERS: usize = 8;
 
-/// Those of them that are the pose; the exposure follows.
-pub const POSE_PARAMETERS: usize = 6;
+/// Those of the pose, before those of the exposure.
+pub const POSE: usize = 6;
+
+/// Those of the exposure.
+pub const EXPOSURE: usize = FRAME_PARAMETERS - POSE;
 
 /// A step of one frame's parameters: `(ω, ρ, δα, δβ)` in radians, metres, 1, grey levels.
 pub type FrameStep = SVector<f64, FRAME_PARAMETERS>;

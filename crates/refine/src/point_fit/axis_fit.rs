@@ -1,10 +1,10 @@
 //! Size and axis of the tunnel along its sections, and whether it bends.
 
-use crate::model::significance::f_bound;
 use crate::point_fit::located_points::SECTION_MODES;
 use crate::point_fit::regression::{Regression, Sample, fit_polynomial};
 use crate::point_fit::section_fit::SectionFit;
 use nalgebra::Vector3;
+use tunnelstitch_geometry::numerics::significance::f_bound;
 
 /// Sections from which on a curvature is looked for: as many again as it takes to fit it.
 const MIN_BEND_SECTIONS: usize = 6;

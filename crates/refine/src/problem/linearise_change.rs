@@ -32,7 +32,7 @@
 
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
-use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep, POSE_PARAMETERS};
+use crate::parameters::frame_estimate::{EXPOSURE, FRAME_PARAMETERS, FrameStep, POSE};
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::block_sums::BlockSums;
 use crate::problem::linearisation::{BlockGradient, Linearisation};
@@ -133,7 +133,7 @@ impl PhotometricProblem<'_> {
         self.add_share(to, stride, factor, &mut next)?;
         for (gradient, exposure) in next.normal.gradient.iter_mut().zip(&exposures) {
             gradient
-                .fixed_rows_mut::<2>(POSE_PARAMETERS)
+                .fixed_rows_mut::<EXPOSURE>(POSE)
                 .copy_from(exposure);
         }
         self.add_others(to, &mut next);
@@ -155,7 +155,7 @@ impl PhotometricProblem<'_> {
         let slots = at.normal.gradient.iter().zip(&change);
         slots
             .take(self.active.len())
-            .map(|(at, change)| (at + change).fixed_rows::<2>(POSE_PARAMETERS).into())
+            .map(|(at, change)| (at + change).fixed_rows::<EXPOSURE>(POSE).into())
             .collect()
     }
 
@@ -299,7 +299,8 @@ mod tests {
             let updated = problem.linearise_change(&at, (&from, &to), stride).unwrap();
             let (mut error, mut change) = (0.0, 0.0);
             for k in 0..to.frames.len() {
-                let of = |at: &Linearisation| at.normal.gradient[k].fixed_rows::<6>(0).into_owned();
+                let of =
+                    |at: &Linearisation| at.normal.gradient[k].fixed_rows::<POSE>(0).into_owned();
                 let expected = of(&whole);
                 error += (of(&updated) - expected).norm_squared();
                 change += (of(&at) - expected).norm_squared();

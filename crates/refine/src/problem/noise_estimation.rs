@@ -49,12 +49,13 @@ impl PhotometricProblem<'_> {
                     #[inline(always)]
                     || {
                         let observations = tile.observations();
-                        tile.workspace
-                            .count_residuals(tile.points, observations, histogram);
-                        if has_denoiser {
-                            tile.workspace
-                                .add_to_spectrum(spectrum.get_or_insert_default());
-                        }
+                        let spectrum = has_denoiser.then(|| spectrum.get_or_insert_default());
+                        tile.workspace.count_residuals(
+                            tile.points,
+                            observations,
+                            histogram,
+                            spectrum,
+                        );
                     },
                 );
             },

@@ -6,9 +6,7 @@
 use crate::linear::factor_error::FactorError;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
-use crate::parameters::frame_estimate::{
-    FRAME_PARAMETERS, FrameEstimate, FrameStep, POSE_PARAMETERS,
-};
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameEstimate, FrameStep, POSE};
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::linearisation::Linearisation;
 use crate::problem::patch_scores::PatchScores;
@@ -313,16 +311,9 @@ impl DampedGaussNewton {
                 self.stop = stop;
                 return Ok((candidate, current));
             }
-            // Equations are updated once: errors would add up.
             let is_updated = self.updated_from.is_some();
-            let share = (!is_updated).then(|| problem.change_share(&current, step_px));
-            let share = share.flatten();
-            let next = match share {
-                Some(stride) => {
-                    problem.linearise_change(&current, (unknowns, &candidate), stride)?
-                }
-                None => problem.linearise_at(&candidate)?,
-            };
+            let (share, next) =
+                self.linearise_step(problem, &current, (unknowns, &candidate), step_px)?;
             let left = next.slope(&step, &shared);
             let settles = step_px < problem.pixel_px()
                 && left.abs() < (1.0 - MIN_SLOPE_REDUCTION) * decrement
@@ -356,6 +347,27 @@ impl DampedGaussNewton {
         }
         self.stop = Some(StopReason::NoFurtherDescent);
         Ok((unknowns.clone(), current))
+    }
+
+    /// The equations after a step of `step_px`, with the n of the share by which the `current` ones
+    /// were updated, if they were.
+    fn linearise_step(
+        &self,
+        problem: &PhotometricProblem,
+        current: &Linearisation,
+        (unknowns, stepped): (&Unknowns, &Unknowns),
+        step_px: f64,
+    ) -> Result<(Option<usize>, Linearisation), ProblemError> {
+        // Equations are updated once: errors would add up.
+        let share = match self.updated_from {
+            Some(_) => None,
+            None => problem.change_share(current, step_px),
+        };
+        let next = match share {
+            Some(stride) => problem.linearise_change(current, (unknowns, stepped), stride),
+            None => problem.linearise_at(stepped),
+        };
+        Ok((share, next?))
     }
 
     /// The step `δ = −(H + λ diag H)⁻¹ g` of the slots and of the shared parameters; None if a
@@ -455,7 +467,7 @@ fn hold_infeasible_frames(
 fn pose_slope(step: &[FrameStep], at: &Linearisation) -> f64 {
     let frames = step.iter().zip(&at.normal.gradient);
     let slopes = frames.map(|(step, gradient)| {
-        let [step, gradient] = [step, gradient].map(|of| of.fixed_rows::<POSE_PARAMETERS>(0));
+        let [step, gradient] = [step, gradient].map(|of| of.fixed_rows::<POSE>(0));
         step.dot(&gradient)
     });
     slopes.sum()

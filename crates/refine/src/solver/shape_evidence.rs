@@ -18,9 +18,9 @@
 //! Iterating this goes there, with one factorisation a step and no pixel read. Traces come from
 //! random signs z: the mean of `zᵀ A⁻¹ z`.
 //!
-//! A scale that does not raise L by more than chance does ([`crate::model::significance`]) is
-//! dropped, the least useful first: a wall as planned ends without a shape, and its poses as if
-//! none had been looked for.
+//! A scale that does not raise L by more than chance does
+//! ([`tunnelstitch_geometry::numerics::significance`]) is dropped, the least useful first: a wall
+//! as planned ends without a shape, and its poses as if none had been looked for.
 //!
 //! The same L bounds what may hide below that: where coefficients of a dropped scale raise it by
 //! `½ z²`, z the quantile of the false-alarm rate, they would have been seen
@@ -37,7 +37,6 @@
 use crate::linear::bordered_system::{SchurComplement, SharedBlock, SharedBorder};
 use crate::linear::normal_equations::{NormalEquations, Pattern};
 use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
-use crate::model::significance::normal_quantile;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::parameters::shape::{Scale, Shape, ShapeModel};
@@ -51,6 +50,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::ops::Range;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::significance::normal_quantile;
 
 /// Steps of the fixed point between two looks at which scales are of use.
 const MAX_STEPS: usize = 8;

@@ -2,7 +2,6 @@
 //! straight tunnel, a curvature; its strengths learned after it.
 
 use crate::model::problem_error::ProblemError;
-use crate::model::significance::chi_squared_bounds;
 use crate::parameters::calibration::{
     BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa, SHARED_PARAMETERS,
 };
@@ -19,6 +18,7 @@ use crate::solver::shape_evidence::{LearnedShape, learn_shape};
 use crate::stages::setup::Setup;
 use crate::stages::state::PipelineState;
 use std::ops::Range;
+use tunnelstitch_geometry::numerics::significance::chi_squared_bounds;
 
 /// The lens in κ.
 const LENS: Range<usize> = 0..INTRINSIC_PARAMETERS;

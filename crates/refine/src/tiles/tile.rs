@@ -321,7 +321,7 @@ mod tests {
                 pixels: 1.0,
                 shade: 1.0,
             });
-            workspace.count_residuals(&points, observations, &mut histogram);
+            workspace.count_residuals(&points, observations, &mut histogram, None);
         }
         (histogram.fit().floor / SAMPLE_SHARE).sqrt()
     }
@@ -368,8 +368,8 @@ mod tests {
             let (mut histogram, mut spectrum) =
                 (NoiseHistogram::default(), TextureSpectrum::default());
             for points in &tiles {
-                workspace.count_residuals(points, observations(), &mut histogram);
-                workspace.add_to_spectrum(&mut spectrum);
+                let spectrum = Some(&mut spectrum);
+                workspace.count_residuals(points, observations(), &mut histogram, spectrum);
             }
             let denoiser = spectrum.denoiser();
             let mut slopes = |denoiser: Option<&Denoiser>| {

@@ -59,7 +59,8 @@ impl TileWorkspace {
         means.collect()
     }
 
-    /// Counts the residuals from the plain mean into `histogram`.
+    /// Counts the residuals from the plain mean into `histogram`, and the texture, if it has no
+    /// gaps, into `spectrum`, if there is one.
     ///
     /// Where n observers have a value, a residual is scaled by `√(n/(n−1))`, as its own value is
     /// part of the mean; where there is only one, it is the mean and tells nothing.
@@ -69,6 +70,7 @@ impl TileWorkspace {
         points: &TilePoints,
         observations: impl Iterator<Item = TileObservation<'a>>,
         histogram: &mut NoiseHistogram,
+        spectrum: Option<&mut TextureSpectrum>,
     ) {
         self.sample(points, observations);
         let mean = self.mean();
@@ -77,6 +79,9 @@ impl TileWorkspace {
             for (n, valid) in values.iter_mut().zip(&frame.valid[SIDE..]) {
                 *n += valid;
             }
+        }
+        if let Some(spectrum) = spectrum.filter(|_| !self.has_gaps) {
+            spectrum.add(&mean, self.shares());
         }
         let gains: f32 = self.frames.iter().map(|frame| frame.gain.powi(2)).sum();
         let square_gain = gains / self.frames.len().max(1) as f32;
@@ -92,13 +97,6 @@ impl TileWorkspace {
                     histogram.add(scale * e, square_gain * squares[k]);
                 }
             }
-        }
-    }
-
-    /// Adds the texture of the sampled tile to `spectrum`, if it has no gaps.
-    pub fn add_to_spectrum(&self, spectrum: &mut TextureSpectrum) {
-        if !self.has_gaps {
-            spectrum.add(&self.mean(), self.shares());
         }
     }
 

@@ -47,9 +47,9 @@ use crate::linear::factor_error::FactorError;
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
 use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
-use crate::parameters::frame_estimate::FRAME_PARAMETERS;
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, POSE};
 use crate::problem::linearisation::OtherInformation;
-use crate::uncertainty::exposure_equations::{ExposurePattern, POSE};
+use crate::uncertainty::exposure_equations::ExposurePattern;
 use crate::uncertainty::frame_sigma::FrameSigma;
 use nalgebra::{Matrix6, Vector6};
 use tunnelstitch_geometry::surface::GaugeMotion;
@@ -233,6 +233,7 @@ fn trace_of_product(pattern: &Pattern, inverse: &SelectedInverse, blocks: &[Bloc
 mod tests {
     use super::*;
     use crate::linear::bordered_system::SharedBorder;
+    use crate::parameters::frame_estimate::EXPOSURE;
     use nalgebra::DMatrix;
 
     fn information(pattern: &Pattern, blocks: &[Block]) -> OtherInformation {
@@ -298,8 +299,8 @@ mod tests {
         assert!((one.1[2][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
         let mut exposed = normal.0.blocks.clone();
         for (block, normal) in exposed.iter_mut().zip(&normal.0.blocks) {
-            let exposures = normal.fixed_view::<2, 2>(POSE, POSE) * 9.0;
-            let mut part = block.fixed_view_mut::<2, 2>(POSE, POSE);
+            let exposures = normal.fixed_view::<EXPOSURE, EXPOSURE>(POSE, POSE) * 9.0;
+            let mut part = block.fixed_view_mut::<EXPOSURE, EXPOSURE>(POSE, POSE);
             part += exposures;
         }
         let same = at(&exposed, &none, 1.0);

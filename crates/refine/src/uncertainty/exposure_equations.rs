@@ -5,13 +5,9 @@
 //! unknowns.
 
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
-use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+use crate::parameters::frame_estimate::{EXPOSURE, FRAME_PARAMETERS, FrameStep, POSE};
 use nalgebra::SMatrix;
 
-/// Unknowns of a frame's pose, before those of its exposure.
-pub const POSE: usize = 6;
-/// Unknowns of a frame's exposure.
-const EXPOSURE: usize = FRAME_PARAMETERS - POSE;
 /// Frames of a slot.
 const FRAMES_PER_SLOT: usize = FRAME_PARAMETERS / EXPOSURE;
 

@@ -43,7 +43,6 @@ use crate::linear::bordered_system::SharedBlock;
 use crate::linear::normal_equations::{Block, Pattern};
 use crate::linear::sparse_cholesky::{Factor, SymbolicFactorisation};
 use crate::model::problem_error::ProblemError;
-use crate::model::significance::normal_quantile;
 use crate::parameters::calibration::SHARED_PARAMETERS;
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::points::equations::PointEquations;
@@ -60,6 +59,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::significance::normal_quantile;
 
 /// Sizes of patches, blocks: up to about the width of a frame.
 const PATCH_BLOCKS: [u32; 3] = [2, 4, 8];

@@ -40,11 +40,10 @@ use crate::linear::normal_equations::{Block, Pattern};
 use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
-use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+use crate::parameters::frame_estimate::{EXPOSURE, FrameStep, POSE};
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::linearisation::{Linearisation, OtherInformation};
 use crate::problem::photometric_problem::PhotometricProblem;
-use crate::uncertainty::exposure_equations::POSE;
 
 /// Curvature of a solution whose score does not change, or the wrong way: with it σ are a thousand
 /// times those of a good solution, and nothing is believed.
@@ -156,7 +155,7 @@ fn information_of_frames(
 /// Gradients of the slots, the first `frames` of which are frames, without those of exposures.
 fn without_exposures(mut gradient: Vec<FrameStep>, frames: usize) -> Vec<FrameStep> {
     for of_frame in &mut gradient[..frames] {
-        of_frame.rows_mut(POSE, FRAME_PARAMETERS - POSE).fill(0.0);
+        of_frame.rows_mut(POSE, EXPOSURE).fill(0.0);
     }
     gradient
 }

@@ -24,12 +24,12 @@
 
 use crate::model::prior::Prior;
 use crate::model::prior_terms::{absolute_error, relative_error};
-use crate::model::significance::{chi_squared_bounds, normal_quantile};
 use crate::parameters::calibration::Datum;
 use crate::thresholds::prior_test::{MAX_SIGMA_RATIO, SCALE_SIGMA};
 use crate::uncertainty::covariance::Covariances;
 use nalgebra::{Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
+use tunnelstitch_geometry::numerics::significance::{chi_squared_bounds, normal_quantile};
 use tunnelstitch_geometry::trajectory::{JitterModel, Pose};
 
 /// Tests of the prior: scale, four σ, runs.
