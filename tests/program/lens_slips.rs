@@ -129,10 +129,18 @@ fn intrinsics_that_do_not_fit_the_picture_are_named() {
             [100.0, 60.0],
             "square pixels (fx = fy = 100 in camera.json)",
         ),
+        (
+            ["cx", "cy"],
+            [159.5, 119.5],
+            "a calibration of pictures of 320 × 240 px (as their width and height in camera.json",
+        ),
     ] {
         let mut wrong = right.clone();
         for (key, value) in key.iter().zip(values) {
             wrong[key] = value.into();
+        }
+        if values[0] > 100.0 {
+            (wrong["fx"], wrong["fy"]) = (200.0.into(), 200.0.into());
         }
         let said = readings(&survey, &wrong);
         assert!(

@@ -32,6 +32,7 @@ mod masks;
 mod mutations;
 mod opencv;
 mod overlays;
+mod own_folders;
 mod panorama;
 mod photogrammetry;
 mod picture_files;

@@ -117,6 +117,10 @@ enum FormatArgument {
     Realitycapture,
     /// Pix4D's calibrated external camera parameters.
     Pix4d,
+    /// JSON or YAML of your own with matrices, or positions and quaternions.
+    Json,
+    /// Record3D's metadata.
+    Record3d,
 }
 
 /// Names of orders of quaternions.
@@ -199,6 +203,8 @@ impl From<FormatArgument> for PoseFormat {
             FormatArgument::Metashape => Self::Metashape,
             FormatArgument::Realitycapture => Self::Realitycapture,
             FormatArgument::Pix4d => Self::Pix4d,
+            FormatArgument::Json => Self::Json,
+            FormatArgument::Record3d => Self::Record3d,
         }
     }
 }

@@ -157,7 +157,7 @@ fn unknown_scale(found: &Discovery) -> Option<String> {
 /// scale of their positions is unknown.
 fn missing(found: &Discovery, error: &SurveyError) -> String {
     match error {
-        SurveyError::Poses(PoseError::Read { .. })
+        SurveyError::Poses(PoseError::Read { .. }) | SurveyError::NoInitialPoses { .. }
             if found.initial().is_none() && faulty_poses(found).is_some() =>
         {
             format!(
@@ -165,7 +165,9 @@ fn missing(found: &Discovery, error: &SurveyError) -> String {
                 faulty_poses(found).unwrap_or_default()
             )
         }
-        SurveyError::Poses(PoseError::Read { .. }) if found.initial().is_none() => {
+        SurveyError::Poses(PoseError::Read { .. }) | SurveyError::NoInitialPoses { .. }
+            if found.initial().is_none() =>
+        {
             "there are no poses; let tunnelstitch plan or tunnelstitch gyro make them, or name a \
              file by initial = \"…\" under [poses]"
                 .to_owned()

@@ -121,6 +121,7 @@ fn calibrations(found: &Discovery) -> Vec<String> {
         return vec![row("calibration", text)];
     }
     let has_rig = found.rig.is_some();
+    let (_, frames) = found.frames();
     let size = |k: usize| found.calibrations.get(k).map(FoundCalibration::size);
     let line = |(k, found): (usize, &FoundCalibration)| {
         let (width, height) = found.size();
@@ -131,6 +132,9 @@ fn calibrations(found: &Discovery) -> Vec<String> {
         });
         let text = format!("{} ({width} × {height} px{selected})", printed(&found.path));
         match k {
+            0 if found.is_scaled_to(frames) => {
+                row("calibration", text + ": it is scaled to the frames' size")
+            }
             0 => row("calibration", text),
             _ if size(k) == size(0) => row("another", format!("{text}: one is enough")),
             _ => row(

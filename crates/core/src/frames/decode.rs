@@ -1,6 +1,7 @@
 //! Decoding of frames.
 
 use super::error::FrameError;
+use super::exif_time::time_s;
 use super::frame_file::{FrameFile, FrameSource};
 use super::picture_decoder::{Content, Input, decoder, open_input};
 use super::picture_end::{is_jpeg, jpeg_is_complete, page_truncation, truncated, truncation};
@@ -99,6 +100,15 @@ impl FrameFile {
             FrameSource::Video(..) | FrameSource::Memory(_) => return Ok(None),
         };
         Ok((named != Orientation::NoTransforms).then(|| named.to_exif()))
+    }
+
+    /// The time of the exposure in the EXIF data of a picture file, seconds since 1970, of UTC if
+    /// they name no zone of time; None if there is none.
+    pub fn exif_time_s(&self) -> Option<f64> {
+        match &self.source {
+            FrameSource::File(_) => time_s(&self.header().ok()?.exif_metadata().ok()??),
+            _ => None,
+        }
     }
 
     /// Reads an image of a recording.

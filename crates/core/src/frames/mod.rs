@@ -5,6 +5,7 @@ mod combing;
 mod counter_overrun;
 mod decode;
 mod error;
+mod exif_time;
 mod frame_file;
 mod frame_set;
 mod grey;

@@ -1,7 +1,7 @@
 //! Association of poses with frames.
 
 use super::error::SurveyError;
-use super::frame_times::from_names;
+use super::frame_times::from_pictures;
 use super::skipped_frame::SkippedFrame;
 use super::strangers::strangers_among;
 use crate::frames::FrameFile;
@@ -91,7 +91,7 @@ fn count_remedy(file: &PoseFile, frames: &[FrameFile], times_s: Option<&[f64]>) 
     if let Some(Some(strangers)) = strangers {
         return format!("; {strangers}");
     }
-    let has_times = || times_s.is_some() || from_names(frames, None).is_ok();
+    let has_times = || times_s.is_some() || from_pictures(frames, None).is_ok();
     let other = if file.has_names() {
         "; or associate them by name (--associate name)"
     } else if file.has_times() && has_times() {

@@ -21,6 +21,8 @@ use tunnelstitch_geometry::trajectory::{
     DuplicateTimes, PoseEntry, PoseFile, PoseFileOptions, read_poses_with,
 };
 
+/// The file of Record3D, beside its pictures.
+const RECORD3D_FILE: &str = "metadata";
 /// Extensions of videos.
 const VIDEO_EXTENSIONS: [&str; 7] = ["mp4", "mov", "m4v", "mkv", "avi", "webm", "mts"];
 
@@ -390,6 +392,7 @@ fn is_mask(file: &Path) -> bool {
 fn is_calibration(file: &Path, extension: &str) -> bool {
     match extension {
         "json" | "toml" | "yaml" | "yml" | "txt" | "sfm" | "xml" | "out" | "csv" | "cam" => true,
+        "" => file.ends_with(RECORD3D_FILE),
         "bin" => file.ends_with("cameras.bin"),
         _ => false,
     }
@@ -423,7 +426,8 @@ fn picture_files(files: &[PathBuf]) -> PictureFiles<'_> {
 fn is_pose_file(file: &Path, extension: &str) -> bool {
     match extension {
         "txt" | "tum" | "csv" | "tsv" | "tab" | "dat" | "asc" | "log" | "traj" | "opk" | "json"
-        | "kitti" | "out" | "sfm" | "xml" => true,
+        | "kitti" | "out" | "sfm" | "xml" | "yaml" | "yml" => true,
+        "" => file.ends_with(RECORD3D_FILE),
         "bin" => file.ends_with("images.bin"),
         _ => false,
     }

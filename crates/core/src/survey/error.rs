@@ -24,6 +24,17 @@ pub enum SurveyError {
         /// The error of the operating system.
         source: std::io::Error,
     },
+    /// The file of the initial poses is not there.
+    #[error(
+        "{}: there is no such file of initial poses; name one by initial = \"…\" under [poses], or \
+         let tunnelstitch plan or tunnelstitch gyro make it (tunnelstitch init --force says why it \
+         took no other file for poses)",
+        printed(path)
+    )]
+    NoInitialPoses {
+        /// The file.
+        path: PathBuf,
+    },
     /// `survey.toml` is malformed or has an unknown key.
     #[error("{}:{line}:{column}: {what}", printed(path))]
     Parse {

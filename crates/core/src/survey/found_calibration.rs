@@ -1,5 +1,6 @@
 //! A calibration that was found in a folder.
 
+use super::calibrated_size::scaled;
 use std::path::{Path, PathBuf};
 use tunnelstitch_geometry::camera::{CalibrationError, Camera, read_calibration_of};
 
@@ -83,6 +84,12 @@ impl FoundCalibration {
             name.clone_into(&mut selected.name);
             self.camera = camera;
         }
+    }
+
+    /// True if frames of that size, if it is known, take the calibration scaled.
+    pub fn is_scaled_to(&self, frames: Option<(u32, u32)>) -> bool {
+        let frames = frames.filter(|frames| *frames != self.size());
+        frames.is_some_and(|(width, height)| scaled(&self.camera, [width, height]).is_some())
     }
 
     /// Width and height, pixels.

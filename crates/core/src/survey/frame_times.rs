@@ -4,6 +4,7 @@ use super::error::SurveyError;
 use crate::frames::FrameFile;
 use std::collections::HashMap;
 use std::path::Path;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::trajectory::{PoseError, TimeUnit, text, times};
 
 /// Reads the frames' times, seconds, one per frame.
@@ -79,22 +80,16 @@ fn read_lines(path: &Path, unit: Option<TimeUnit>) -> Result<Vec<Line>, SurveyEr
     let mut lines = Vec::new();
     for (number, line) in text::lines(&text) {
         let fail = |what: String| PoseError::line(path, number, what);
-        let words: Vec<&str> = line
-            .split(|c: char| c == ',' || c.is_whitespace())
-            .filter(|word| !word.is_empty())
-            .collect();
-        let (time, name) = match words.as_slice() {
-            [time] => (*time, None),
-            [first, second] if times::from_word(first, unit).is_some() => (*first, Some(*second)),
-            [first, second] => (*second, Some(*first)),
-            _ => {
-                return Err(fail(format!(
-                    "{} columns where a line is `time`, `time name` or `name time`",
-                    words.len()
-                ))
-                .into());
-            }
+        let is_between = |c: char| c == ',' || c.is_whitespace();
+        let line = line.trim_matches(is_between);
+        let is_time = |word: &str| times::from_word(word, unit).is_some();
+        // Names may have blanks.
+        let (time, name) = match (line.split_once(is_between), line.rsplit_once(is_between)) {
+            (Some((time, name)), _) if is_time(time) => (time, Some(name)),
+            (_, Some((name, time))) => (time, Some(name)),
+            (_, None) => (line, None),
         };
+        let name = name.map(|name| name.trim_matches(is_between));
         let time_s = times::from_word(time, unit).ok_or_else(|| {
             fail(format!(
                 "`{time}` is not a time; give seconds, or whole nanoseconds"
@@ -107,6 +102,27 @@ fn read_lines(path: &Path, unit: Option<TimeUnit>) -> Result<Vec<Line>, SurveyEr
         });
     }
     Ok(lines)
+}
+
+/// Reads the times from the frames' names, in `unit`, or in that which the number of digits tells;
+/// where these have none, from EXIF data, if they name one for each frame.
+///
+/// # Errors
+/// The first frame whose name contains no time.
+pub(super) fn from_pictures(
+    frames: &[FrameFile],
+    unit: Option<TimeUnit>,
+) -> Result<Vec<f64>, SurveyError> {
+    from_names(frames, unit).or_else(|error| {
+        let first = frames.first().and_then(FrameFile::exif_time_s);
+        let exif = || -> Option<Vec<f64>> {
+            let times_s = frames.par_map(FrameFile::exif_time_s);
+            times_s.into_iter().collect()
+        };
+        // Pictures of one second have no time of their own.
+        let increase = |times_s: &Vec<f64>| times_s.is_sorted_by(|a, b| a < b);
+        first.and_then(|_| exif()).filter(increase).ok_or(error)
+    })
 }
 
 /// Reads the times from the frames' names, in `unit`, or in that which the number of digits tells.
@@ -168,6 +184,15 @@ mod tests {
     }
 
     #[test]
+    fn names_may_have_blanks() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("times.txt");
+        std::fs::write(&path, "1.5 part 1/frame 1.png\nframe 2.png, 2.5\n").unwrap();
+        let times_s = read(&path, &frames(&["frame 1.png", "frame 2.png"]), None);
+        assert_eq!(times_s.unwrap(), [1.5, 2.5]);
+    }
+
+    #[test]
     fn bad_lists_say_what_is_wrong() {
         for (text, expected) in [
             ("", "0 times for 2 frames"),
@@ -177,7 +202,7 @@ mod tests {
             ("1 a.png\n2 a.png\n", ":2: a second time of a.png"),
             ("1 a.png\n", "no time of frame 1 (b.png)"),
             ("1 a.png\n2\n", "some lines have a name"),
-            ("1 a.png 3\n", ":1: 3 columns"),
+            ("1 a.png 3\n", "no time of frame 0 (a.png)"),
         ] {
             let message = read_text(text).unwrap_err().to_string();
             assert!(message.contains(expected), "{message}");

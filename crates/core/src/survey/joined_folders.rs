@@ -40,7 +40,7 @@ mod tests {
             pattern: format!("{folder}/*.png"),
             first: Path::new(folder).join("1.png"),
             count,
-            names_time: false,
+            has_time: false,
             size: Some((width, 48)),
             turned_size: None,
             fault: None,

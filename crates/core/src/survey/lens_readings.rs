@@ -11,6 +11,8 @@ use tunnelstitch_geometry::files::{decode_text, read_regular};
 const FOCAL_FACTORS: [f64; 6] = [0.7, 0.79, 0.89, 1.12, 1.26, 1.42];
 /// The nearest of these on either side.
 const NEAREST_FACTORS: [f64; 2] = [0.89, 1.12];
+/// Largest ratio of the sizes of pictures that a calibration is of and of the frames.
+const MAX_SIZE_RATIO: f64 = 8.0;
 /// Smallest fraction of the picture that a lens shows.
 const MIN_VISIBLE_FRACTION: f64 = 0.5;
 
@@ -25,6 +27,8 @@ pub enum CameraReading {
     Focal([f64; 2]),
     /// Another principal point, pixels.
     Centre([f64; 2]),
+    /// A calibration of pictures of another size, whose sides are so many times those of the frames.
+    OfSize(f64),
     /// Another lens.
     Lens(Lens),
 }
@@ -41,6 +45,13 @@ impl CameraReading {
             },
             Self::Focal([fx, fy]) => Camera { fx, fy, ..*given },
             Self::Centre([cx, cy]) => Camera { cx, cy, ..*given },
+            Self::OfSize(ratio) => Camera {
+                fx: given.fx / ratio,
+                fy: given.fy / ratio,
+                cx: (given.cx + 0.5) / ratio - 0.5,
+                cy: (given.cy + 0.5) / ratio - 0.5,
+                ..*given
+            },
             Self::Lens(lens) => Camera { lens, ..*given },
         }
     }
@@ -87,7 +98,8 @@ impl Survey {
     }
 }
 
-/// Focal lengths of square pixels, where those given differ by more than the nearest factor that is
+/// The calibration of pictures of another size, where its principal point is their middle; focal
+/// lengths of square pixels, where those given differ by more than the nearest factor that is
 /// tried, and principal points that are as near to the middle as none given is: it swapped, and the
 /// middle itself, where the one given is in the outer half of the picture.
 fn other_intrinsics(given: &Camera, file: &Path) -> Vec<(String, CameraReading)> {
@@ -119,7 +131,34 @@ fn other_intrinsics(given: &Camera, file: &Path) -> Vec<(String, CameraReading)>
     if off(own) > 0.5 {
         add(middle, "near the middle of the picture");
     }
+    readings.extend(of_another_size(given, file));
     readings
+}
+
+/// A calibration of larger or smaller pictures, if its principal point is the middle of some of the
+/// same shape. The ratio of sizes is one of quarters: 1.5, 2, 2.25, or their inverses.
+fn of_another_size(given: &Camera, file: &Path) -> Option<(String, CameraReading)> {
+    let sides = [given.width, given.height].map(f64::from);
+    let own = [2.0 * given.cx + 1.0, 2.0 * given.cy + 1.0];
+    let [x, y] = [own[0] / sides[0], own[1] / sides[1]];
+    let mean = 0.5 * (x + y);
+    let is_near = |ratio: f64| (NEAREST_FACTORS[0]..NEAREST_FACTORS[1]).contains(&ratio);
+    let is_possible = (1.0 / MAX_SIZE_RATIO..=MAX_SIZE_RATIO).contains(&mean);
+    if !is_possible || !is_near(x / y) || is_near(mean) {
+        return None;
+    }
+    let quarters = |ratio: f64| (4.0 * ratio).round() / 4.0;
+    let ratio = match mean > 1.0 {
+        true => quarters(mean),
+        false => 1.0 / quarters(1.0 / mean),
+    };
+    let [width, height] = sides.map(|side| (ratio * side).round());
+    let remedy = format!(
+        "a calibration of pictures of {width} × {height} px (as their width and height in {}, \
+         and it is scaled to the frames)",
+        file.display()
+    );
+    Some((remedy, CameraReading::OfSize(ratio)))
 }
 
 /// The lens that was meant, and the lines of the calibration `file` that give it.
@@ -261,6 +300,9 @@ mod tests {
             others(|camera| (camera.cx, camera.cy) = (0.0, 0.0)),
             [middle]
         );
+        // Calibrated with pictures of twice the size.
+        let twice = others(|camera| *camera = CameraReading::OfSize(0.5).camera(camera));
+        assert!(twice.contains(&CameraReading::OfSize(2.0)), "{twice:?}");
         let fx = right.fx;
         let square = [fx, 1.5 * fx].map(|focal| CameraReading::Focal([focal; 2]));
         assert_eq!(others(|camera| camera.fy *= 1.5), square);

@@ -96,6 +96,7 @@
 mod associate;
 mod calibrate;
 mod calibrated;
+mod calibrated_size;
 mod camera_section;
 mod camera_sections;
 mod capture;
@@ -113,6 +114,7 @@ mod frame_times;
 mod ignore;
 mod interpreted_poses;
 mod joined_folders;
+mod keyframe_poses;
 mod keyframe_selection;
 mod left_aside;
 mod lens_readings;

@@ -21,8 +21,8 @@ use tunnelstitch_geometry::camera::Cameras;
 use tunnelstitch_geometry::files::printed;
 use tunnelstitch_geometry::surface::{Bend, RadialField, Surface, WallRegions, bent, displaced};
 use tunnelstitch_geometry::trajectory::{
-    Jitter, MAX_SEARCH_VOLUME_DEG3, Pose, Rig, Shutter, StampedPose, Trajectory, poses_of,
-    read_tunnel_frame,
+    Jitter, MAX_SEARCH_VOLUME_DEG3, Pose, PoseError, Rig, Shutter, StampedPose, Trajectory,
+    poses_of, read_tunnel_frame,
 };
 
 /// A survey, read and validated, except the pixels.
@@ -182,7 +182,8 @@ impl Survey {
         if let Some(step_deg) = survey.file.frames.angle_step_deg {
             survey.select_keyframes(step_deg, &toml_path, planned.as_ref())?;
         }
-        let mut read = survey.read_initial(planned.as_ref())?;
+        let read = survey.read_initial(planned.as_ref());
+        let mut read = read.map_err(|error| survey.without_initial_poses(error))?;
         let initial = std::mem::take(&mut read.trajectory);
         let mut warnings = std::mem::take(&mut read.warnings);
         let truth = survey.read_truth()?;
@@ -207,6 +208,19 @@ impl Survey {
         survey.unscaled_unit_m = read.has_no_scale.then_some(unit_m);
         survey.validate_readout().map_err(value)?;
         Ok(survey)
+    }
+
+    /// The error of reading the initial poses, if their file is not there in other words.
+    fn without_initial_poses(&self, error: SurveyError) -> SurveyError {
+        let path = self.folder.join(&self.file.poses.initial);
+        match error {
+            SurveyError::Poses(PoseError::Read { source, .. })
+                if source.kind() == std::io::ErrorKind::NotFound && !path.exists() =>
+            {
+                SurveyError::NoInitialPoses { path }
+            }
+            other => other,
+        }
     }
 
     /// Reads the initial poses, in the tunnel `planned` or as it was built; none where they are

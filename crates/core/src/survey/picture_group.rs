@@ -15,8 +15,8 @@ pub struct PictureGroup {
     pub first: PathBuf,
     /// Number of pictures; of TIFF files with several pages, that of these.
     pub count: usize,
-    /// True if the name of the first picture has its time.
-    pub names_time: bool,
+    /// True if the name of the first picture has its time, or its EXIF data have.
+    pub has_time: bool,
     /// Width and height of the first picture, pixels, if readable.
     pub size: Option<(u32, u32)>,
     /// Width and height of the first picture when it is turned or mirrored as its EXIF data ask,
@@ -38,8 +38,9 @@ impl PictureGroup {
             .as_deref()
             .and_then(Path::file_stem)
             .unwrap_or_default();
-        let names_time = times::from_name(&stem.to_string_lossy(), None).is_some();
+        let is_in_name = times::from_name(&stem.to_string_lossy(), None).is_some();
         let first = FrameFile::picture(0, path.unwrap_or_default());
+        let has_time = is_in_name || first.exif_time_s().is_some();
         let frame = |file: &&PathBuf| FrameFile::picture(0, folder.join(file));
         let pages = |file: &&PathBuf| frame(file).split_into_pages().len();
         // Stacks are of one kind: a folder of single pages is not opened file by file.
@@ -59,7 +60,7 @@ impl PictureGroup {
                 .first()
                 .map_or_else(PathBuf::new, |first| first.to_path_buf()),
             count: frames,
-            names_time,
+            has_time,
             fault: size.as_ref().err().map(ToString::to_string),
             size: size.ok(),
             turned_size: match is_turned {
@@ -159,7 +160,7 @@ mod tests {
             pattern: "*.jpg".to_owned(),
             first: PathBuf::new(),
             count: 1,
-            names_time: false,
+            has_time: false,
             size: Some((64, 48)),
             turned_size,
             fault: None,

@@ -8,6 +8,7 @@ use super::error::SurveyError;
 use super::file::FramesSection;
 use super::frame_times;
 use super::interpreted_poses::InterpretedPoses;
+use super::keyframe_poses;
 use super::missing_poses::{self, MissingPoses};
 use super::pose_conflicts::{FrameConflict, frame_conflicts};
 use super::pose_shift::shifted;
@@ -132,8 +133,13 @@ impl<'a> PoseReader<'a> {
                 given
             }
             Associate::Time => {
-                let (given, contradictions) = self.associate_by_time(&file)?;
+                let (timed, contradictions) = self.associate_by_time(&file, missing)?;
                 conflicts = contradictions;
+                let timed = (timed.as_slice(), None);
+                let times_s = self.frame_times()?;
+                let (given, left_out) =
+                    missing_poses::complete(&file.path, frames, Some(&times_s), timed, missing)?;
+                gaps = left_out;
                 given
             }
         };
@@ -225,12 +231,13 @@ impl<'a> PoseReader<'a> {
     /// Associates the poses that a file has with frames by their times.
     fn present_by_time(&self, file: &PoseFile) -> Result<Vec<Option<StampedPose>>, SurveyError> {
         let how = self.time_association();
-        let (frames, times_s) = (self.frames.frames, self.frame_times()?);
-        let each = (0..frames.len()).map(|k| {
-            let found = by_time(file, &frames[k..=k], &times_s[k..=k], how);
-            found.ok().and_then(|poses| poses.first().copied())
-        });
-        Ok(each.collect())
+        let times_s = self.frame_times()?;
+        Ok(keyframe_poses::present(
+            file,
+            self.frames.frames,
+            &times_s,
+            how,
+        ))
     }
 
     /// The parameters of the association by time.
@@ -242,29 +249,54 @@ impl<'a> PoseReader<'a> {
     }
 
     /// Associates the poses of a file by the times of the frames, and names its contradictions.
-    /// Where they do not fit, but do in other units, the error names these.
+    /// Where they do not fit, but do in other units, the error names these. At least half of the
+    /// frames have a pose, if `missing` ones start between their neighbours, else all.
     fn associate_by_time(
         &self,
         file: &PoseFile,
-    ) -> Result<(Trajectory, Vec<FrameConflict>), SurveyError> {
+        missing: MissingPoses,
+    ) -> Result<(Vec<Option<StampedPose>>, Vec<FrameConflict>), SurveyError> {
         let how = self.time_association();
         let frames = self.frames.frames;
         let associated = self.frame_times().and_then(|times_s| {
-            let given = by_time(file, frames, &times_s, how)?;
-            Ok((given, times_s))
+            let all = by_time(file, frames, &times_s, how)?;
+            Ok(all.into_iter().map(Some).collect())
         });
-        let (given, times_s) = associated.map_err(|error| {
+        let given = associated.or_else(|error| {
             let slip = || self.unit_slip(file, how).map(|slip| slip.to_string());
             match self.clock_slip(file, how).or_else(slip) {
-                Some(what) => SurveyError::Association {
+                Some(what) => Err(SurveyError::Association {
                     path: file.path.clone(),
                     what,
-                },
-                None => error,
+                }),
+                None => self.poses_of_keyframes(file, missing, error),
             }
         })?;
         let unit_m = self.section.unit_m.unwrap_or(1.0);
-        Ok((given, frame_conflicts(file, &times_s, how, unit_m)))
+        let conflicts = frame_conflicts(file, &self.frame_times()?, how, unit_m);
+        Ok((given, conflicts))
+    }
+
+    /// The poses that frames have by their times, if these are at least half of them and others may
+    /// be `missing`; else the `error` of the first one without.
+    fn poses_of_keyframes(
+        &self,
+        file: &PoseFile,
+        missing: MissingPoses,
+        error: SurveyError,
+    ) -> Result<Vec<Option<StampedPose>>, SurveyError> {
+        let (frames, how) = (self.frames.frames, self.time_association());
+        let Ok(times_s) = self.frame_times() else {
+            return Err(error);
+        };
+        let present = keyframe_poses::present(file, frames, &times_s, how);
+        let known = present.iter().flatten().count();
+        let may_miss = missing == MissingPoses::Interpolate && !how.interpolate;
+        if may_miss && known >= 2 && 2 * known >= frames.len() {
+            Ok(present)
+        } else {
+            Err(keyframe_poses::with_remedy(error, file, frames, &times_s))
+        }
     }
 }
 
@@ -275,7 +307,7 @@ impl PoseReader<'_> {
             Some(times_s) => Ok(Cow::Borrowed(times_s)),
             None => {
                 let unit = self.frames.section.time_unit;
-                frame_times::from_names(self.frames.frames, unit).map(Cow::Owned)
+                frame_times::from_pictures(self.frames.frames, unit).map(Cow::Owned)
             }
         }
     }
@@ -303,7 +335,7 @@ impl PoseReader<'_> {
             (Some(times), _) => {
                 frame_times::read(&self.folder.join(times), frames, Some(unit)).ok()
             }
-            (None, None) => frame_times::from_names(frames, Some(unit)).ok(),
+            (None, None) => frame_times::from_pictures(frames, Some(unit)).ok(),
             // A video or a recording has seconds.
             (None, Some(_)) => None,
         };

@@ -350,7 +350,7 @@ fn other_texts(section: &PosesSection, given: &InterpretedPoses) -> Vec<PoseRead
     let mut add = |remedy: String, other: InterpretedPoses| {
         others.push(PoseReading::of_poses(remedy, 1, other.trajectory()));
     };
-    if section.quaternion.is_none() && given.format == PoseFormat::Tum {
+    if section.quaternion.is_none() && matches!(given.format, PoseFormat::Tum | PoseFormat::Json) {
         let remedy = "quaternions as w x y z (quaternion = \"wxyz\" under [poses])";
         add(remedy.to_owned(), given.changed(with_w_first));
     }

@@ -1,5 +1,6 @@
 //! The frames of a survey and the cameras that took them.
 
+use super::calibrated_size::scaled_to_frames;
 use super::camera_section::CameraSection;
 use super::error::SurveyError;
 use super::file::{FramesSection, SurveyFile};
@@ -71,6 +72,19 @@ impl SurveyPlace<'_> {
         Ok(with_range(&camera, surface))
     }
 
+    /// The camera with its calibration scaled to the size of its frames, if it is of another, and
+    /// the warning that it is.
+    fn scaled(
+        &self,
+        section: &CameraSection,
+        camera: Camera,
+        listed: &FrameList,
+    ) -> (Camera, Option<String>) {
+        let file = section.file.as_ref().map(|file| self.folder.join(file));
+        let scaled = file.and_then(|file| scaled_to_frames(&camera, &listed.frames, &file));
+        scaled.map_or((camera, None), |(camera, said)| (camera, Some(said)))
+    }
+
     /// The mask of frames of a camera, if they have one.
     fn mask(&self, frames: &FramesSection, camera: &Camera) -> Result<Option<Mask>, SurveyError> {
         let (width, height) = (camera.width, camera.height);
@@ -98,13 +112,17 @@ impl SurveyPlace<'_> {
         let frames = &self.file.frames;
         let camera = self.camera(section, frames, surface)?;
         let listed = FrameList::new(frames, self.toml_path, self.folder, None)?;
+        let (camera, scaled) = self.scaled(section, camera, &listed);
+        let mut warnings = Vec::from_iter(scaled);
         let size = (camera.width, camera.height);
         let (listed, warning) = listed.oriented(size, frames);
+        warnings.extend(warning);
         let (listed, skipped) = match frames.skip_bad {
             Some(true) => skip_unreadable(listed, size)?,
             _ => (listed, Vec::new()),
         };
         let bits = FrameList::used_bits(std::slice::from_ref(&listed), size, frames);
+        warnings.extend(bits.map(bits_warning));
         let listed = match bits {
             Some(bits) => listed.with_bits(bits),
             None => listed,
@@ -117,7 +135,7 @@ impl SurveyPlace<'_> {
             times_s: listed.times_s,
             video: listed.video,
             bits,
-            warnings: warning.into_iter().chain(bits.map(bits_warning)).collect(),
+            warnings,
             frames: FrameSet::new(listed.frames, self.mask(frames, &camera)?),
         })
     }
@@ -131,6 +149,8 @@ impl SurveyPlace<'_> {
             let frames = self.file.frames_of(k);
             let camera = self.camera(section, &frames, surface)?;
             let listed = FrameList::new(&frames, self.toml_path, self.folder, None)?;
+            let (camera, scaled) = self.scaled(section, camera, &listed);
+            warnings.extend(scaled);
             let (listed, warning) = listed.oriented((camera.width, camera.height), &frames);
             warnings.extend(warning);
             masks.push(self.mask(&frames, &camera)?);

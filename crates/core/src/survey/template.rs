@@ -236,7 +236,7 @@ impl Discovery {
             let _ = writeln!(text, "topic = {}", quoted(topic));
         }
         let is_by_time = poses.entries.len() != count || !poses.conflicts.is_empty();
-        let frames_have_times = self.picture_frames().is_none_or(|group| group.names_time);
+        let frames_have_times = self.picture_frames().is_none_or(|group| group.has_time);
         if is_by_time && frames_have_times && poses.has_times() && !poses.has_names() {
             *text += if self.video.is_some() {
                 "associate = \"time\"       # by the video's times, or by [frames] times = FILE\n\
@@ -245,7 +245,7 @@ impl Discovery {
                 "associate = \"time\"       # by the times of the recording\n\
                  interpolate = true\n"
             } else {
-                "associate = \"time\"       # by the frames' names, or by [frames] times = FILE\n\
+                "associate = \"time\"       # by the frames' names or EXIF data, or by [frames] times = FILE\n\
                  # interpolate = true\n"
             };
         }

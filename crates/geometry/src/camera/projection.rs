@@ -91,6 +91,24 @@ impl Camera {
         Self::at_rest(size, [f, f], [cx, cy], Lens::default())
     }
 
+    /// This camera with pictures of another size that were scaled from its own: the centre of a
+    /// pixel moves from u to `s (u + ½) − ½`. None where the sides ask for factors that differ by
+    /// more than a pixel of rounding, as those of cropped pictures do.
+    pub fn scaled_to(&self, [width, height]: [u32; 2]) -> Option<Self> {
+        let own = [self.width, self.height].map(f64::from);
+        let [x, y] = [f64::from(width) / own[0], f64::from(height) / own[1]];
+        let is_scaled = (x - y).abs() < 1.0 / own[0] + 1.0 / own[1];
+        is_scaled.then(|| Self {
+            width,
+            height,
+            fx: x * self.fx,
+            fy: y * self.fy,
+            cx: x * (self.cx + 0.5) - 0.5,
+            cy: y * (self.cy + 0.5) - 0.5,
+            ..*self
+        })
+    }
+
     /// This camera with a rolling-shutter motion.
     #[inline]
     pub fn with_sweep(&self, sweep: &Sweep) -> Self {

@@ -47,6 +47,9 @@ pub(super) fn detect_format(
             what,
         });
     }
+    if let Some(titles) = csv::Header::unknown_titles(text) {
+        return Err(unknown_titles(path, &titles));
+    }
     let words = row::NamedRow::of(line)
         .map_err(|what| PoseError::line(path, number, what))?
         .words;
@@ -67,13 +70,28 @@ pub(super) fn detect_format(
                 "in no known format: neither of TUM (`{}`), \
                  KITTI (`{}`), CSV (`{}` named in the first line) nor a \
                  file of COLMAP, nerfstudio, EuRoC, OpenSfM, Bundler, Meshroom, OpenMVG, \
-                 Metashape, RealityCapture or Pix4D; if it is one of them, name it with \
+                 Metashape, RealityCapture, Pix4D or Record3D; if it is one of them, name it with \
                  --pose-format (poses.format in survey.toml)",
                 tum::FORM,
                 kitti::FORM,
                 csv::FORM
             ),
         }),
+    }
+}
+
+/// The error of a table none of whose titles is known.
+fn unknown_titles(path: &Path, titles: &[&str]) -> PoseError {
+    PoseError::OtherKind {
+        path: path.to_owned(),
+        line: None,
+        what: format!(
+            "is a table whose columns (`{}`) are not known by their names, and `columns` under \
+             [poses] tells which of them are those of poses, as columns = {{ frame = \"…\", tx = \
+             \"…\", ty = \"…\", tz = \"…\", qx = \"…\", qy = \"…\", qz = \"…\", qw = \"…\" }}, or rx, \
+             ry and rz with euler",
+            titles.join("`, `")
+        ),
     }
 }
 
@@ -105,6 +123,9 @@ struct TopKeys {
     frames: Option<IgnoredAny>,
     poses: Option<IgnoredAny>,
     extrinsics: Option<IgnoredAny>,
+    /// Of Record3D.
+    #[serde(rename = "K")]
+    matrix: Option<IgnoredAny>,
 }
 
 /// Detects the format of a JSON object; None if it is valid and of none. What is not valid is left
@@ -113,6 +134,9 @@ fn detect_json(text: &str) -> Option<PoseFormat> {
     let Ok(keys) = serde_json::from_str::<TopKeys>(text) else {
         return Some(PoseFormat::Nerfstudio);
     };
+    if keys.poses.is_some() && keys.matrix.is_some() {
+        return Some(PoseFormat::Record3d);
+    }
     match (keys.poses, keys.extrinsics, keys.frames) {
         (Some(_), None, None) => Some(PoseFormat::Meshroom),
         (None, Some(_), None) => Some(PoseFormat::Openmvg),

@@ -17,7 +17,7 @@ pub enum DuplicateTimes {
 }
 
 /// The poses of a file, and what contradicts them.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(super) struct ParsedPoses {
     /// The poses; their times, if present, increase.
     pub entries: Vec<PoseEntry>,

@@ -33,6 +33,10 @@ pub enum PoseFormat {
     Realitycapture,
     /// Pix4D's calibrated external camera parameters; read only.
     Pix4d,
+    /// JSON or YAML of people's own; read only.
+    Json,
+    /// Record3D's metadata; read only.
+    Record3d,
     /// Messages of a recording (MCAP, ROS 1 bag); read only.
     Recording,
 }
@@ -51,9 +55,11 @@ impl PoseFormat {
     /// The camera axes of the format.
     pub fn axes(self) -> CameraAxes {
         match self {
-            Self::Nerfstudio | Self::Bundler | Self::Realitycapture | Self::Pix4d => {
-                CameraAxes::OpenGl
-            }
+            Self::Nerfstudio
+            | Self::Bundler
+            | Self::Realitycapture
+            | Self::Pix4d
+            | Self::Record3d => CameraAxes::OpenGl,
             _ => CameraAxes::OpenCv,
         }
     }
@@ -64,7 +70,11 @@ impl PoseFormat {
         self.has_no_scale()
             || matches!(
                 self,
-                Self::Metashape | Self::Realitycapture | Self::Pix4d | Self::Recording
+                Self::Metashape
+                    | Self::Realitycapture
+                    | Self::Pix4d
+                    | Self::Record3d
+                    | Self::Recording
             )
     }
 

@@ -116,8 +116,8 @@ proptest! {
         let (_dir, path) = file_of(text.as_bytes());
         let _ = read_poses(&path, None);
         use PoseFormat::{
-            Bundler, Colmap, Csv, Euroc, Kitti, Meshroom, Metashape, Nerfstudio, Openmvg, Opensfm,
-            Pix4d, Realitycapture, Tum,
+            Bundler, Colmap, Csv, Euroc, Json, Kitti, Meshroom, Metashape, Nerfstudio, Openmvg,
+            Opensfm, Pix4d, Realitycapture, Record3d, Tum,
         };
         for format in [
             Tum,
@@ -133,6 +133,8 @@ proptest! {
             Metashape,
             Realitycapture,
             Pix4d,
+            Json,
+            Record3d,
         ] {
             let _ = read_poses(&path, Some(format));
         }

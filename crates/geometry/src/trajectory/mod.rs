@@ -16,6 +16,8 @@
 //! | `metashape` (read only) | camera-to-world, OpenCV's axes | | yes |
 //! | `realitycapture` (read only) | camera-to-world, OpenGL's axes | | yes |
 //! | `pix4d` (read only) | camera-to-world, OpenGL's axes | | yes |
+//! | `own_json` (read only) | camera-to-world, OpenCV's axes | if there | if there |
+//! | `record3d` (read only) | camera-to-world, OpenGL's axes | seconds, if there | |
 //! | `recorded` (read only) | child-to-parent, as OpenCV's camera-to-world | seconds | |
 //!
 //! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
@@ -64,6 +66,8 @@ pub mod nerfstudio;
 mod open3d;
 mod openmvg;
 mod opensfm;
+mod own_json;
+mod own_keys;
 mod pix4d;
 mod plan;
 mod pose;
@@ -73,6 +77,7 @@ mod pose_file;
 mod pose_options;
 mod quaternion_order;
 mod realitycapture;
+mod record3d;
 mod recorded;
 mod rig;
 mod rigid;

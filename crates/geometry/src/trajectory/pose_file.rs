@@ -10,7 +10,8 @@ use super::pose_options::PoseFileOptions;
 use super::stamped_pose::{StampedPose, Trajectory};
 use super::{
     bundler, colmap, colmap_binary, csv, euroc, kitti, matrix_blocks, matrix_files, meshroom,
-    metashape, nerfstudio, open3d, openmvg, opensfm, pix4d, realitycapture, recorded, text, tum,
+    metashape, nerfstudio, open3d, openmvg, opensfm, own_json, pix4d, realitycapture, record3d,
+    recorded, text, tum,
 };
 use crate::recordings::is_recording;
 use std::path::{Path, PathBuf};
@@ -137,6 +138,10 @@ fn read_text(
     {
         return Ok((PoseFormat::Kitti, entries.into()));
     }
+    let may_be_own = matches!(options.format, None | Some(PoseFormat::Json));
+    if may_be_own && own_json::has_poses(path, &text) {
+        return Ok((PoseFormat::Json, own_json::parse(path, &text, options)?));
+    }
     let text = matrix_blocks::on_one_line(&text);
     let format = match options.format {
         Some(format) => format,
@@ -157,6 +162,8 @@ fn read_text(
         PoseFormat::Metashape => metashape::parse(path, &text)?.into(),
         PoseFormat::Realitycapture => realitycapture::parse(path, &text)?.into(),
         PoseFormat::Pix4d => pix4d::parse(path, &text)?.into(),
+        PoseFormat::Json => own_json::parse(path, &text, options)?,
+        PoseFormat::Record3d => record3d::parse(path, &text, options)?,
         PoseFormat::Recording => {
             return Err(PoseError::file(
                 path,

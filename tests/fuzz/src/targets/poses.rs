@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use tunnelstitch::survey::{Associate, Survey};
 use tunnelstitch::trajectory::{Pose, PoseFormat, read_poses};
 
-const FORMATS: [Option<PoseFormat>; 14] = [
+const FORMATS: [Option<PoseFormat>; 16] = [
     None,
     Some(PoseFormat::Tum),
     Some(PoseFormat::Kitti),
@@ -21,6 +21,8 @@ const FORMATS: [Option<PoseFormat>; 14] = [
     Some(PoseFormat::Metashape),
     Some(PoseFormat::Realitycapture),
     Some(PoseFormat::Pix4d),
+    Some(PoseFormat::Json),
+    Some(PoseFormat::Record3d),
 ];
 const TIES: [Option<Associate>; 4] = [
     None,

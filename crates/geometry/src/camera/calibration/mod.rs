@@ -23,6 +23,7 @@
 //! | Pix4D | `.txt` that begins with `fileName imageWidth imageHeight`; `.cam`, size from the pictures | perspective | (½, ½) |
 //! | Basalt | `.json` with `value0` | `pinhole`, `ds`, `eucm`, `ucm`, `kb4`, `fov` | (0, 0) |
 //! | Gyroflow | `.json` with `fisheye_params` and `calib_dimension` | `opencv_fisheye`, `opencv_standard` | (0, 0) |
+//! | Record3D | `metadata`, a JSON with `K`, `w`, `h` and `poses` | no distortion | (0, 0) |
 //! | recording | `.mcap`, `.bag` | `plumb_bob`, `rational_polynomial`, `equidistant` of its CameraInfo | (0, 0) |
 //! | nerfstudio, instant-ngp | `.json` with `fl_x`, `camera_angle_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |
 
@@ -54,6 +55,7 @@ mod picture_size;
 mod pix4d;
 mod read;
 mod realitycapture;
+mod record3d;
 mod recorded;
 mod selection;
 #[cfg(test)]

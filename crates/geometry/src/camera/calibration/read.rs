@@ -6,7 +6,7 @@ use super::unknown::unknown_calibration;
 use super::{
     basalt, bundler, camodocal, colmap, colmap_binary, gyroflow, kalibr, meshroom, metashape,
     native, nerfstudio, ocamcalib, opencv, opencv_xml, openmvg, opensfm, orbslam, pix4d,
-    realitycapture, recorded, value_tree,
+    realitycapture, record3d, recorded, value_tree,
 };
 use crate::camera::projection::Camera;
 use crate::files::limits::MAX_CALIBRATION_BYTES;
@@ -130,6 +130,7 @@ fn parse(
         }
         _ => match value_tree::parse_json(text) {
             Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name, size),
+            Ok(tree) if record3d::is_metadata(&tree) => record3d::read(&tree),
             Ok(tree) if gyroflow::is_profile(&tree) => gyroflow::read(&tree),
             Ok(tree) if opensfm::is_reconstruction(&tree) => opensfm::read(&tree, name),
             Ok(tree) if opensfm::is_camera_models(&tree) => opensfm::named_camera(&tree, name),

@@ -20,6 +20,9 @@ pub(crate) struct Header<'a> {
 /// Smallest number of columns of poses that a header names.
 const MIN_POSE_COLUMNS: usize = 2;
 
+/// Smallest number of numbers in a row of poses: a position and a rotation.
+const MIN_NUMBERS: usize = 6;
+
 /// Columns of a rotation matrix.
 const MATRIX_COLUMNS: usize = 9;
 
@@ -75,6 +78,24 @@ impl<'a> Header<'a> {
             }
         }
         None
+    }
+
+    /// The titles of a table of numbers none of which names a column of poses; None for any other
+    /// text.
+    pub fn unknown_titles(text: &'a str) -> Option<Vec<&'a str>> {
+        let first = Self::first_line(text)?;
+        let is_number =
+            |cell: &&str| float(&text::with_decimal_point(cell, first.separator)).is_some();
+        let titles = split(first.line, first.separator).ok()?;
+        let (_, row) = first.records(text).next()?;
+        let row = split(row, first.separator).ok()?;
+        let is_table = row.len() == titles.len()
+            && titles.iter().all(|title| !is_number(&title))
+            && row.iter().filter(is_number).count() >= MIN_NUMBERS;
+        is_table.then(|| {
+            let cells = first.line.split(char::from(first.separator));
+            cells.map(|cell| cell.trim().trim_matches('"')).collect()
+        })
     }
 
     /// The first line with content after a `sep=;`, with the separator that it or that line has.
@@ -146,6 +167,21 @@ fn named_separator(line: &str) -> Option<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn titles_in_another_language_are_listed() {
+        let table = "sep=;\nBild;Rechtswert;Hochwert;H;a;b;\"c\"\n1.jpg;1,5;2;3;0,1;0;0\n";
+        let expected = ["Bild", "Rechtswert", "Hochwert", "H", "a", "b", "c"];
+        assert_eq!(Header::unknown_titles(table).unwrap(), expected);
+        for other in [
+            "a b c d e f g\n1 2 3\n",
+            "1 2 3 4 5 6 7\n1 2 3 4 5 6 7\n",
+            "notes\n",
+            "",
+        ] {
+            assert_eq!(Header::unknown_titles(other), None, "{other}");
+        }
+    }
 
     /// A comment of TUM's columns leaves the file to TUM; any other order is that of a table.
     #[test]
