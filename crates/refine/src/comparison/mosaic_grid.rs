@@ -62,6 +62,18 @@ impl MosaicGrid {
         context.surface.lattice(&s, &h, &mut points);
         points
     }
+
+    /// The unit normals of the wall at the columns, at the chainage of the middle row.
+    pub fn column_normals(&self, context: &EstimationContext) -> Vec<Vector3<f32>> {
+        let h_m = self.h_m + 0.5 * self.rows as f64 * self.spacing_m;
+        (0..self.columns)
+            .map(|column| {
+                let s_m = self.s_m + column as f64 * self.spacing_m;
+                let frame = context.surface.frame(WallPoint { s_m, h_m });
+                frame.e_s.cross(&frame.e_h).normalize().cast()
+            })
+            .collect()
+    }
 }
 
 /// Width of a pixel on the wall where `pose` looks, metres.

@@ -2,7 +2,8 @@
 //!
 //! Gauss–Newton ends in a minimum, which is not always the right one; neighbours may agree with
 //! each other and not with the turn before. So once all frames are tracked, every pair that
-//! overlaps is compared on the wall: local contrast of the one against that of the other. Pairs at
+//! overlaps is compared on the wall that both resolve alike: local contrast of the one against that
+//! of the other. Pairs at
 //! right poses correlate as well as the texture allows, others do not, and a low residual fused
 //! from several frames cannot hide it.
 
@@ -13,6 +14,8 @@ use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
+use crate::samples::footprints::MIN_RESOLVED_SHARE;
+use crate::samples::viewpoint::Viewpoint;
 use crate::thresholds::assessment::MIN_PIXEL_SHARE;
 use crate::thresholds::pairwise_ncc::{
     COARSE_WINDOW_PX, FINE_LEVEL, FINE_WINDOW_PX, MIN_CORRELATION, MIN_SHARE_WITHOUT_OUTLIERS,
@@ -22,7 +25,7 @@ use crate::tiles::residual_weighting::robust_correlation;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
-use tunnelstitch_geometry::surface::Footprint;
+use tunnelstitch_geometry::surface::{Footprint, mean_radius_m};
 
 /// The comparison of two frames where they overlap.
 #[derive(Clone, Copy, Debug)]
@@ -200,6 +203,12 @@ struct PosedFrames<'a> {
 }
 
 impl PosedFrames<'_> {
+    /// The viewpoint of a frame; wall points will be given relative to `origin`.
+    fn viewpoint(&self, frame: usize, origin: &Vector3<f64>) -> Viewpoint {
+        let radius_m = mean_radius_m(self.context.surface.as_ref());
+        Viewpoint::new(&self.states.estimates[frame].pose, origin, radius_m)
+    }
+
     /// Compares frame `a` with its partners.
     fn compare_with_partners(&self, a: usize, partners: &[usize]) -> Vec<Compared> {
         let context = self.context;
@@ -212,15 +221,22 @@ impl PosedFrames<'_> {
         let grid = MosaicGrid::over(footprint, STRIDE_PX * pixel_size_m);
         let points = grid.world_points(context);
         let origin = points[points.len() / 2];
+        let normals = grid.column_normals(context);
         let sampler = own.sampler_at(context, pose, &origin);
+        let viewpoint = self.viewpoint(a, &origin);
         let samples: Vec<Sample> = points
             .iter()
             .enumerate()
             .filter(|(k, _)| !context.ignored.contains(&grid.wall_point(*k)))
-            .filter_map(|(_, x_w)| {
-                let offset = x_w - origin;
-                let point = [offset.x as f32, offset.y as f32, offset.z as f32];
-                Some((point, sampler.contrast_and_detail(&point)?))
+            .filter_map(|(k, x_w)| {
+                let point = (x_w - origin).cast().into();
+                let normal = normals[k % grid.columns];
+                Some(Sample {
+                    point,
+                    normal,
+                    area_share: viewpoint.area_share(&point, &normal),
+                    own: sampler.contrast_and_detail(&point)?,
+                })
             })
             .collect();
         let compare = |b: &usize| self.compare(a, *b, &origin, &samples);
@@ -238,14 +254,20 @@ impl PosedFrames<'_> {
         let unwrapped = self.unwrapped_frames.get(&b)?;
         let pose = &self.states.estimates[b].pose;
         let sampler = unwrapped.sampler_at(self.context, pose, origin);
+        let viewpoint = self.viewpoint(b, origin);
         let mut ncc_score = NccScore::default();
         let (mut own_detail, mut other_detail) = (0.0f64, 0.0f64);
         let mut shared = Vec::with_capacity(samples.len());
-        for (point, (x, noise_x, own)) in samples {
-            if let Some((y, noise_y, other)) = sampler.contrast_and_detail(point) {
-                ncc_score.add((*x, *noise_x), (y, noise_y));
-                shared.push((*x, y));
-                own_detail += f64::from(*own).powi(2);
+        for sample in samples {
+            let area_share = viewpoint.area_share(&sample.point, &sample.normal);
+            if !is_comparable(sample.area_share, area_share) {
+                continue;
+            }
+            if let Some((y, noise_y, other)) = sampler.contrast_and_detail(&sample.point) {
+                let (x, noise_x, own) = sample.own;
+                ncc_score.add((x, noise_x), (y, noise_y));
+                shared.push((x, y));
+                own_detail += f64::from(own).powi(2);
                 other_detail += f64::from(other).powi(2);
             }
         }
@@ -263,9 +285,28 @@ impl PosedFrames<'_> {
     }
 }
 
-/// A wall point relative to the origin, with local contrast, the variance of its noise, and fine
-/// detail.
-type Sample = ([f32; 3], (f32, f32, f32));
+/// True if two pictures, in which a piece of the wall has these shares of the area that it has when
+/// it is seen squarely from the axis, show the same detail of it: both resolve it, and neither is
+/// more than a pyramid level coarser than the other.
+fn is_comparable(a: f32, b: f32) -> bool {
+    let (less, more) = (a.min(b), a.max(b));
+    less > MIN_RESOLVED_SHARE as f32 && more < MAX_AREA_RATIO * less
+}
+
+/// Ratio of the areas of pixels at neighbouring levels of a pyramid.
+const MAX_AREA_RATIO: f32 = 4.0;
+
+/// A wall point that a frame shows.
+struct Sample {
+    /// The point relative to the origin, metres.
+    point: [f32; 3],
+    /// The unit normal of the wall.
+    normal: Vector3<f32>,
+    /// Area in the frame, over that seen squarely from the axis ([`Viewpoint::area_share`]).
+    area_share: f32,
+    /// Local contrast in the frame, the variance of its noise, and fine detail.
+    own: (f32, f32, f32),
+}
 
 /// The correlation corrected for noise, of all samples or of most, whichever is greater: a few
 /// glints outweigh a faint wall.

@@ -11,7 +11,7 @@ use crate::samples::viewpoint::Viewpoint;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Footprint, WallPoint, mean_radius_m};
+use tunnelstitch_geometry::surface::{Footprint, mean_radius_m};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// The wall around a frame, fused from the registered frames.
@@ -66,7 +66,7 @@ impl ReferenceMosaic {
         let grid = MosaicGrid::over(&footprint, spacing_m);
         let middle = footprint.middle();
         let origin = context.surface.frame(middle).x_w;
-        let normals = column_normals(context, &grid, middle.h_m);
+        let normals = grid.column_normals(context);
         let points: Vec<[f32; 3]> = grid
             .world_points(context)
             .iter()
@@ -169,20 +169,6 @@ impl ReferenceMosaic {
             bias: (y - gain * x) / n,
         }
     }
-}
-
-/// The normal of the wall at every column of the grid, at chainage `h_m`.
-fn column_normals(context: &EstimationContext, grid: &MosaicGrid, h_m: f64) -> Vec<Vector3<f32>> {
-    (0..grid.columns)
-        .map(|column| {
-            let wall = WallPoint {
-                s_m: grid.s_m + column as f64 * grid.spacing_m,
-                h_m,
-            };
-            let frame = context.surface.frame(wall);
-            frame.e_s.cross(&frame.e_h).normalize().cast()
-        })
-        .collect()
 }
 
 /// Fuses one wall point from the frames that resolve it: mean contrast, variance of its noise, and
