@@ -340,7 +340,7 @@ fn view(most: usize) -> [usize; 2] {
 #[test]
 fn some_faults_lose_nothing() {
     if can_trace() {
-        stitch(3);
+        stitch(2);
         export(1);
     }
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 mod fuzz;
 
 /// Damaged copies for each target; fewer where one takes long.
-const COPIES: usize = 500;
+const COPIES: usize = 200;
 const FEW_COPIES: usize = 40;
 
 /// Targets of which a call takes long.

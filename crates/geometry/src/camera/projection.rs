@@ -98,7 +98,7 @@ impl Camera {
         let own = [self.width, self.height].map(f64::from);
         let [x, y] = [f64::from(width) / own[0], f64::from(height) / own[1]];
         let is_scaled = (x - y).abs() < 1.0 / own[0] + 1.0 / own[1];
-        is_scaled.then(|| Self {
+        is_scaled.then_some(Self {
             width,
             height,
             fx: x * self.fx,

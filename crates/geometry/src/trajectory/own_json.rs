@@ -273,7 +273,7 @@ mod tests {
     fn names_times_and_numbers_are_found() {
         let entry = |index: u32, name: &str, y: f64| {
             json!({ "id": index, "imageName": name, "timestamp": 1_764_060_458_000_000_000_u64
-                + u64::from(index), "position": [0, y, 0], "quaternion": [0, 0, 0, 1] })
+                + 1_000_000 * u64::from(index), "position": [0, y, 0], "quaternion": [0, 0, 0, 1] })
         };
         let read = read(&json!([entry(2, "b.png", 0.2), entry(1, "a.png", 0.1)])).unwrap();
         assert_eq!(read[0].name.as_deref(), Some("a.png"));
