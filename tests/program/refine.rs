@@ -3,6 +3,8 @@
 use crate::support::{
     self, first_frames, json, refined_blender_survey, simulate, succeed, text, tunnelstitch,
 };
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
 #[test]
@@ -277,6 +279,31 @@ fn a_turn_closes_on_the_right_tile() {
     assert_eq!(believed.count(), 60);
     let px = photometric_wall_px(&survey, &out);
     assert!(px < 0.05, "{px}");
+}
+
+/// A bare wall in noise, but for specks: they are all that there is of it.
+#[test]
+fn specks_on_a_bare_wall_are_enough() {
+    const SIDE_PX: u32 = 600;
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut wall = image::GrayImage::from_pixel(SIDE_PX, SIDE_PX, image::Luma([150]));
+    for _ in 0..160 {
+        let [u, v] = [0; 2].map(|_: i32| rng.random_range(0..SIDE_PX - 10));
+        let (side, grey) = (rng.random_range(4..10), [80, 220][rng.random_range(0..2)]);
+        for (x, y) in (0..side * side).map(|k| (k % side, k / side)) {
+            wall.put_pixel(u + x, v + y, image::Luma([grey]));
+        }
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let texture = dir.path().join("specks.png");
+    wall.save(&texture).unwrap();
+    let options = "--texture-width-m 2.5 --frames 14 --size 240x180 --noise 3 --supersample 3";
+    let options: Vec<&str> = options.split(' ').collect();
+    let dir = simulate_and_refine(&[&["--texture", text(&texture)], &options[..]].concat());
+    let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
+    assert_eq!(json(&out.join("refine.json"))["frames_on_prior"], 0);
+    let px = photometric_wall_px(&survey, &out);
+    assert!(px < 1.0, "{px}");
 }
 
 /// Sharp bricks: joint estimation of the wall removes at least a quarter of the error, and the

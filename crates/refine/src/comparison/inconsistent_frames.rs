@@ -238,7 +238,7 @@ mod tests {
             samples: 100.0,
             correlation,
             contradicts: correlation < MIN_CORRELATION,
-            sharpness_ratio: Some(1.0),
+            sharpness: None,
         }
     }
 

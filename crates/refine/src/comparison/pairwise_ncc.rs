@@ -40,9 +40,17 @@ pub struct PairNcc {
     pub contradicts: bool,
     /// Correlation of local contrast, corrected for noise.
     pub correlation: f64,
-    /// Variance of the earlier frame's finest detail over the later one's, gains removed; None
-    /// where noise drowns it.
-    pub sharpness_ratio: Option<f64>,
+    /// The earlier frame's sharpness over the later one's; None where noise drowns the finest detail.
+    pub sharpness: Option<SharpnessRatio>,
+}
+
+/// The sharpness of a frame over that of another.
+#[derive(Clone, Copy, Debug)]
+pub struct SharpnessRatio {
+    /// Ratio of the variances of their finest detail, gains removed.
+    pub variance: f64,
+    /// Ratio of the areas that the wall has in them, where they are compared.
+    pub area: f64,
 }
 
 /// Compares those frames that are inliers and overlap: at pyramid level
@@ -89,7 +97,7 @@ pub fn compute_pairwise_ncc(
                 samples: coarse.samples,
                 contradicts: correlation < MIN_CORRELATION,
                 correlation,
-                sharpness_ratio: fine_correlation.and(fine.map(|fine| fine.sharpness_ratio)),
+                sharpness: fine_correlation.and(fine.map(|fine| fine.sharpness)),
             })
         })
         .collect();
@@ -139,7 +147,7 @@ struct Compared {
     b: usize,
     samples: f64,
     correlation: Option<f64>,
-    sharpness_ratio: f64,
+    sharpness: SharpnessRatio,
 }
 
 /// Compares the pairs for which `is_wanted` is true.
@@ -257,6 +265,7 @@ impl PosedFrames<'_> {
         let viewpoint = self.viewpoint(b, origin);
         let mut ncc_score = NccScore::default();
         let (mut own_detail, mut other_detail) = (0.0f64, 0.0f64);
+        let (mut own_area, mut other_area) = (0.0f64, 0.0f64);
         let mut shared = Vec::with_capacity(samples.len());
         for sample in samples {
             let area_share = viewpoint.area_share(&sample.point, &sample.normal);
@@ -269,6 +278,8 @@ impl PosedFrames<'_> {
                 shared.push((x, y));
                 own_detail += f64::from(own).powi(2);
                 other_detail += f64::from(other).powi(2);
+                own_area += f64::from(sample.area_share);
+                other_area += f64::from(area_share);
             }
         }
         let gain = |k: usize| self.states.estimates[k].log_gain.exp();
@@ -279,8 +290,11 @@ impl PosedFrames<'_> {
             b,
             samples: ncc_score.samples,
             correlation: robust_corrected_correlation(&ncc_score, &shared),
-            sharpness_ratio: gain_ratio * gain_ratio * own_detail
-                / other_detail.max(f64::MIN_POSITIVE),
+            sharpness: SharpnessRatio {
+                variance: gain_ratio * gain_ratio * own_detail
+                    / other_detail.max(f64::MIN_POSITIVE),
+                area: own_area / other_area,
+            },
         })
     }
 }
