@@ -26,8 +26,8 @@ pub struct LocalContrast {
     pub sensitivity: GreyImage,
 }
 
-/// Detail is clipped at this multiple of its spread ([`detail`]), because glints and foreign objects
-/// would otherwise dominate a faint wall.
+/// Detail is clipped at this multiple of its spread ([`detail`]), because glints and foreign
+/// objects would otherwise dominate a faint wall.
 const MAX_DETAIL_SIGMAS: f32 = 1.5;
 
 /// Computes detail and contrast with mean and variance over a square window of `2 reach + 1` pixels
@@ -103,9 +103,9 @@ fn robust_sigma(values: impl Iterator<Item = f32>) -> f32 {
     MAD_TO_SIGMA as f32 * *median
 }
 
-/// Clips deviations from the local mean at a few times their spread ([`detail`]). On a coarser level, glints
-/// and objects in front of the wall would blend into it, where a robust loss could no longer
-/// separate them.
+/// Clips deviations from the local mean at a few times their spread ([`detail`]). On a coarser
+/// level, glints and objects in front of the wall would blend into it, where a robust loss could no
+/// longer separate them.
 pub fn clip_outliers(image: &GreyImage) -> GreyImage {
     let values = clip_detail(image, wide_window(image), MAX_CLIPPED_SIGMAS);
     GreyImage::new(image.width(), image.height(), values)

@@ -27,7 +27,8 @@ pub enum CameraReading {
     Focal([f64; 2]),
     /// Another principal point, pixels.
     Centre([f64; 2]),
-    /// A calibration of pictures of another size, whose sides are so many times those of the frames.
+    /// A calibration of pictures of another size, whose sides are so many times those of the
+    /// frames.
     OfSize(f64),
     /// Another lens.
     Lens(Lens),

@@ -245,7 +245,7 @@ impl Discovery {
                 "associate = \"time\"       # by the times of the recording\n\
                  interpolate = true\n"
             } else {
-                "associate = \"time\"       # by the frames' names or EXIF data, or by [frames] times = FILE\n\
+                "associate = \"time\"       # by names or EXIF data, or [frames] times = FILE\n\
                  # interpolate = true\n"
             };
         }

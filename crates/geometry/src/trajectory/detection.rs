@@ -88,8 +88,8 @@ fn unknown_titles(path: &Path, titles: &[&str]) -> PoseError {
         what: format!(
             "is a table whose columns (`{}`) are not known by their names, and `columns` under \
              [poses] tells which of them are those of poses, as columns = {{ frame = \"…\", tx = \
-             \"…\", ty = \"…\", tz = \"…\", qx = \"…\", qy = \"…\", qz = \"…\", qw = \"…\" }}, or rx, \
-             ry and rz with euler",
+             \"…\", ty = \"…\", tz = \"…\", qx = \"…\", qy = \"…\", qz = \"…\", qw = \"…\" }}, \
+             or rx, ry and rz with euler",
             titles.join("`, `")
         ),
     }

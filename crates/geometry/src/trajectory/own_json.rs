@@ -200,7 +200,7 @@ mod tests {
         parse(path, &text, &PoseFileOptions::default()).map(|parsed| parsed.entries)
     }
 
-    /// The same two poses in the forms that people write.
+    /// Two poses in the forms that people write.
     #[test]
     fn every_usual_form_has_the_same_poses() {
         let poses = spiral(2, 0.3, 0.4);

@@ -1,10 +1,11 @@
 //! Rejection of blurred frames.
 //!
-//! Of two frames, the one from which the wall is farther, or more oblique, shows less fine detail of
-//! it without being blurred: along the tunnel, each frame does than those after it. Averages over
-//! pixels of the area A on the wall have a variance that falls by A^−p, with p between 0 for a wall
-//! that is smooth over a pixel and 1 for one that has no two points alike. The pairs themselves tell
-//! p: with the ratios v of variances and a of areas in the picture, `ln v = p ln a` by least squares.
+//! Of two frames, the one from which the wall is farther, or more oblique, shows less fine detail
+//! of it without being blurred: along the tunnel, each frame does than those after it. Averages
+//! over pixels of the area A on the wall have a variance that falls by A^−p, with p between 0 for
+//! a wall that is smooth over a pixel and 1 for one that has no two points alike. The pairs
+//! themselves tell p: with the ratios v of variances and a of areas in the picture, `ln v = p ln a`
+//! by least squares.
 
 use crate::comparison::pairwise_ncc::{PairNcc, SharpnessRatio};
 use crate::model::rejection::RejectionReason;

@@ -40,7 +40,7 @@ pub struct PairNcc {
     pub contradicts: bool,
     /// Correlation of local contrast, corrected for noise.
     pub correlation: f64,
-    /// The earlier frame's sharpness over the later one's; None where noise drowns the finest detail.
+    /// The earlier frame's sharpness over the later one's; None where noise drowns fine detail.
     pub sharpness: Option<SharpnessRatio>,
 }
 
