@@ -2,7 +2,7 @@
 //!
 //! A pose is a 4 × 4 or 3 × 4 matrix, row by row, or an object with a matrix, or with a position
 //! and a quaternion or a rotation matrix. Names of keys are compared without capitals and signs
-//! between words ([`keys`](super::own_keys)). The list is the file, or the only entry of its object
+//! between words ([`keys`]). The list is the file, or the only entry of its object
 //! that holds poses. Poses are camera-to-world with OpenCV's axes unless a key says otherwise.
 
 use super::entry_list::{EntryList, ParsedPoses};
