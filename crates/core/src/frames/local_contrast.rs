@@ -63,8 +63,8 @@ fn clip_detail(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
     values
 }
 
-/// The means over windows of `2 reach + 1` pixels, and the spread of the deviations from them by
-/// which outliers are told (0 for an image without values).
+/// The means over windows of `2 reach + 1` pixels, and the spread of the deviations from them, of
+/// which outliers are multiples (0 for an image without values).
 ///
 /// It is the robust σ of the deviations over the share ρ of their variance that neighbouring pixels
 /// have in common, along rows or columns: `ρ = 1 − σ²(I(x+1) − I(x))/2σ²`, by robust σ again. The

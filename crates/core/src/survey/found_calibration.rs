@@ -88,7 +88,6 @@ impl FoundCalibration {
 
     /// True if frames of that size, if it is known, take the calibration scaled.
     pub fn is_scaled_to(&self, frames: Option<(u32, u32)>) -> bool {
-        let frames = frames.filter(|frames| *frames != self.size());
         frames.is_some_and(|(width, height)| scaled(&self.camera, [width, height]).is_some())
     }
 

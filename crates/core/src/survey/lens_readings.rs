@@ -46,13 +46,7 @@ impl CameraReading {
             },
             Self::Focal([fx, fy]) => Camera { fx, fy, ..*given },
             Self::Centre([cx, cy]) => Camera { cx, cy, ..*given },
-            Self::OfSize(ratio) => Camera {
-                fx: given.fx / ratio,
-                fy: given.fy / ratio,
-                cx: (given.cx + 0.5) / ratio - 0.5,
-                cy: (given.cy + 0.5) / ratio - 0.5,
-                ..*given
-            },
+            Self::OfSize(ratio) => given.resampled([given.width, given.height], [1.0 / ratio; 2]),
             Self::Lens(lens) => Camera { lens, ..*given },
         }
     }

@@ -51,6 +51,11 @@ fn gaps<T>(poses: &[Option<T>]) -> Vec<PoseGap> {
     gaps
 }
 
+/// True if so many known poses suffice to place `frames` between them.
+pub(super) fn are_enough(known: usize, frames: usize) -> bool {
+    known >= 2 && 2 * known >= frames
+}
+
 /// Completes the poses of the file `path`, whose first pose is that of `first_name`, at the frames
 /// that it leaves out. `times_s`: the frames' times, if given by a file or a video; else a frame's
 /// share of the way counts frames.
@@ -75,8 +80,8 @@ pub(super) fn complete(
         .enumerate()
         .filter_map(|(k, pose)| Some((k, (*pose)?)))
         .collect();
-    let is_enough = known.len() >= 2 && 2 * known.len() >= poses.len();
-    if !gaps.is_empty() && (missing == MissingPoses::Refuse || !is_enough) {
+    let may_miss = missing == MissingPoses::Interpolate && are_enough(known.len(), poses.len());
+    if !gaps.is_empty() && !may_miss {
         let remedy = match missing {
             MissingPoses::Refuse => String::new(),
             MissingPoses::Interpolate => {

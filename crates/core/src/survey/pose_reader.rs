@@ -133,10 +133,10 @@ impl<'a> PoseReader<'a> {
                 given
             }
             Associate::Time => {
-                let (timed, contradictions) = self.associate_by_time(&file, missing)?;
-                conflicts = contradictions;
+                let times_s = self.frame_times_for(&file)?;
+                let timed = self.associate_by_time(&file, &times_s, missing)?;
+                conflicts = self.conflicts(&file, &times_s);
                 let timed = (timed.as_slice(), None);
-                let times_s = self.frame_times()?;
                 let (given, left_out) =
                     missing_poses::complete(&file.path, frames, Some(&times_s), timed, missing)?;
                 gaps = left_out;
@@ -248,55 +248,37 @@ impl<'a> PoseReader<'a> {
         }
     }
 
-    /// Associates the poses of a file by the times of the frames, and names its contradictions.
-    /// Where they do not fit, but do in other units, the error names these. At least half of the
-    /// frames have a pose, if `missing` ones start between their neighbours, else all.
+    /// Associates the poses of a file by the times of the frames. Where they do not fit, but do in
+    /// other units, the error names these. At least half of the frames have a pose, if `missing`
+    /// ones start between their neighbours, else all.
     fn associate_by_time(
         &self,
         file: &PoseFile,
+        times_s: &[f64],
         missing: MissingPoses,
-    ) -> Result<(Vec<Option<StampedPose>>, Vec<FrameConflict>), SurveyError> {
-        let how = self.time_association();
-        let frames = self.frames.frames;
-        let associated = self.frame_times().and_then(|times_s| {
-            let all = by_time(file, frames, &times_s, how)?;
-            Ok(all.into_iter().map(Some).collect())
-        });
-        let given = associated.or_else(|error| {
-            let slip = || self.unit_slip(file, how).map(|slip| slip.to_string());
-            match self.clock_slip(file, how).or_else(slip) {
-                Some(what) => Err(SurveyError::Association {
-                    path: file.path.clone(),
-                    what,
-                }),
-                None => self.poses_of_keyframes(file, missing, error),
-            }
-        })?;
-        let unit_m = self.section.unit_m.unwrap_or(1.0);
-        let conflicts = frame_conflicts(file, &self.frame_times()?, how, unit_m);
-        Ok((given, conflicts))
-    }
-
-    /// The poses that frames have by their times, if these are at least half of them and others may
-    /// be `missing`; else the `error` of the first one without.
-    fn poses_of_keyframes(
-        &self,
-        file: &PoseFile,
-        missing: MissingPoses,
-        error: SurveyError,
     ) -> Result<Vec<Option<StampedPose>>, SurveyError> {
         let (frames, how) = (self.frames.frames, self.time_association());
-        let Ok(times_s) = self.frame_times() else {
-            return Err(error);
+        let error = match by_time(file, frames, times_s, how) {
+            Ok(all) => return Ok(all.into_iter().map(Some).collect()),
+            Err(error) => error,
         };
-        let present = keyframe_poses::present(file, frames, &times_s, how);
+        if let Some(slip) = self.time_slip(file, Some(times_s)) {
+            return Err(slip);
+        }
+        let present = keyframe_poses::present(file, frames, times_s, how);
         let known = present.iter().flatten().count();
         let may_miss = missing == MissingPoses::Interpolate && !how.interpolate;
-        if may_miss && known >= 2 && 2 * known >= frames.len() {
+        if may_miss && missing_poses::are_enough(known, frames.len()) {
             Ok(present)
         } else {
-            Err(keyframe_poses::with_remedy(error, file, frames, &times_s))
+            Err(keyframe_poses::with_remedy(error, file, frames, times_s))
         }
+    }
+
+    /// The contradictions of a file of poses that are associated by time.
+    fn conflicts(&self, file: &PoseFile, times_s: &[f64]) -> Vec<FrameConflict> {
+        let unit_m = self.section.unit_m.unwrap_or(1.0);
+        frame_conflicts(file, times_s, self.time_association(), unit_m)
     }
 }
 
@@ -312,15 +294,29 @@ impl PoseReader<'_> {
         }
     }
 
-    /// The sentence about clocks that differ by a usual offset, if that makes the times fit.
-    fn clock_slip(&self, file: &PoseFile, how: TimeAssociation) -> Option<String> {
-        let times_s = self.frame_times().ok()?;
-        let found = ClockSlip::find(file, self.frames.frames, &times_s, how)?;
-        Some(found.sentence(self.section.time_offset_s))
+    /// The times of the frames for the association with the poses of a file; where they have none,
+    /// but do in another unit that fits, the error names that.
+    fn frame_times_for(&self, file: &PoseFile) -> Result<Cow<'_, [f64]>, SurveyError> {
+        self.frame_times()
+            .map_err(|error| self.time_slip(file, None).unwrap_or(error))
+    }
+
+    /// The error that names a slip of times, if without it they fit: clocks that differ by a usual
+    /// offset, or other units. `times_s`: the times of the frames, if they have some.
+    fn time_slip(&self, file: &PoseFile, times_s: Option<&[f64]>) -> Option<SurveyError> {
+        let how = self.time_association();
+        let clock = times_s
+            .and_then(|times_s| ClockSlip::find(file, self.frames.frames, times_s, how))
+            .map(|found| found.sentence(self.section.time_offset_s));
+        let unit = || self.unit_slip(file, times_s).map(|slip| slip.to_string());
+        Some(SurveyError::Association {
+            path: file.path.clone(),
+            what: clock.or_else(unit)?,
+        })
     }
 
     /// Other units in which the times of the poses and those of the frames fit each other.
-    fn unit_slip(&self, file: &PoseFile, how: TimeAssociation) -> Option<UnitSlip> {
+    fn unit_slip(&self, file: &PoseFile, times_s: Option<&[f64]>) -> Option<UnitSlip> {
         let FramesToPose {
             frames, section, ..
         } = self.frames;
@@ -341,8 +337,9 @@ impl PoseReader<'_> {
         };
         let as_given = ClockReading {
             poses: Some(file.clone()),
-            frames: self.frame_times().ok().map(Cow::into_owned),
+            frames: times_s.map(<[f64]>::to_vec),
         };
+        let how = self.time_association();
         UnitSlip::find(as_given, frames, how, poses_in, frames_in)
     }
 }

@@ -91,22 +91,29 @@ impl Camera {
         Self::at_rest(size, [f, f], [cx, cy], Lens::default())
     }
 
-    /// This camera with pictures of another size that were scaled from its own: the centre of a
-    /// pixel moves from u to `s (u + ½) − ½`. None where the sides ask for factors that differ by
-    /// more than a pixel of rounding, as those of cropped pictures do.
+    /// This camera with pictures of `size` in which a pixel's width and height are those of its own
+    /// over `factors` s: the centre of a pixel moves from u to `s (u + ½) − ½`.
+    pub fn resampled(&self, size: [u32; 2], factors: [f64; 2]) -> Self {
+        let ([width, height], [x, y]) = (size, factors);
+        Self {
+            width,
+            height,
+            fx: self.fx * x,
+            fy: self.fy * y,
+            cx: (self.cx + 0.5) * x - 0.5,
+            cy: (self.cy + 0.5) * y - 0.5,
+            ..*self
+        }
+    }
+
+    /// This camera with pictures of another size that were scaled from its own. None where the
+    /// sides ask for factors that differ by more than a pixel of rounding, as those of cropped
+    /// pictures do.
     pub fn scaled_to(&self, [width, height]: [u32; 2]) -> Option<Self> {
         let own = [self.width, self.height].map(f64::from);
         let [x, y] = [f64::from(width) / own[0], f64::from(height) / own[1]];
         let is_scaled = (x - y).abs() < 1.0 / own[0] + 1.0 / own[1];
-        is_scaled.then_some(Self {
-            width,
-            height,
-            fx: x * self.fx,
-            fy: y * self.fy,
-            cx: x * (self.cx + 0.5) - 0.5,
-            cy: y * (self.cy + 0.5) - 0.5,
-            ..*self
-        })
+        is_scaled.then(|| self.resampled([width, height], [x, y]))
     }
 
     /// This camera with a rolling-shutter motion.
@@ -272,18 +279,8 @@ impl Camera {
     /// A pixel of the halved image covers 2 × 2 pixels of the level below, so centres shift by half
     /// a pixel: `u_l = (u + ½)/2^l − ½`.
     pub fn at_level(&self, level: usize) -> Self {
-        let scale = 0.5f64.powi(level as i32);
-        Self {
-            width: self.width >> level,
-            height: self.height >> level,
-            fx: self.fx * scale,
-            fy: self.fy * scale,
-            cx: (self.cx + 0.5) * scale - 0.5,
-            cy: (self.cy + 0.5) * scale - 0.5,
-            lens: self.lens,
-            sweep: self.sweep,
-            max_range_m: self.max_range_m,
-        }
+        let size = [self.width, self.height].map(|side| side >> level);
+        self.resampled(size, [0.5f64.powi(level as i32); 2])
     }
 
     /// The camera of an image with `times` as many pixels along each axis.

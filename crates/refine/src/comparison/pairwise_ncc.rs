@@ -3,9 +3,8 @@
 //! Gauss–Newton ends in a minimum, which is not always the right one; neighbours may agree with
 //! each other and not with the turn before. So once all frames are tracked, every pair that
 //! overlaps is compared on the wall that both resolve alike: local contrast of the one against that
-//! of the other. Pairs at
-//! right poses correlate as well as the texture allows, others do not, and a low residual fused
-//! from several frames cannot hide it.
+//! of the other. Pairs at right poses correlate as well as the texture allows, others do not, and a
+//! low residual fused from several frames cannot hide it.
 
 use crate::comparison::mosaic_grid::{MosaicGrid, pixel_size_m};
 use crate::comparison::ncc_score::NccScore;
@@ -14,8 +13,7 @@ use crate::comparison::unwrapped_frame::UnwrappedFrame;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
-use crate::samples::footprints::MIN_RESOLVED_SHARE;
-use crate::samples::viewpoint::Viewpoint;
+use crate::samples::viewpoint::{Viewpoint, is_resolved_alike};
 use crate::thresholds::assessment::MIN_PIXEL_SHARE;
 use crate::thresholds::pairwise_ncc::{
     COARSE_WINDOW_PX, FINE_LEVEL, FINE_WINDOW_PX, MIN_CORRELATION, MIN_SHARE_WITHOUT_OUTLIERS,
@@ -238,12 +236,13 @@ impl PosedFrames<'_> {
             .filter(|(k, _)| !context.ignored.contains(&grid.wall_point(*k)))
             .filter_map(|(k, x_w)| {
                 let point = (x_w - origin).cast().into();
+                let own = sampler.contrast_and_detail(&point)?;
                 let normal = normals[k % grid.columns];
                 Some(Sample {
                     point,
                     normal,
                     area_share: viewpoint.area_share(&point, &normal),
-                    own: sampler.contrast_and_detail(&point)?,
+                    own,
                 })
             })
             .collect();
@@ -269,7 +268,7 @@ impl PosedFrames<'_> {
         let mut shared = Vec::with_capacity(samples.len());
         for sample in samples {
             let area_share = viewpoint.area_share(&sample.point, &sample.normal);
-            if !is_comparable(sample.area_share, area_share) {
+            if !is_resolved_alike(sample.area_share, area_share) {
                 continue;
             }
             if let Some((y, noise_y, other)) = sampler.contrast_and_detail(&sample.point) {
@@ -298,17 +297,6 @@ impl PosedFrames<'_> {
         })
     }
 }
-
-/// True if two pictures, in which a piece of the wall has these shares of the area that it has when
-/// it is seen squarely from the axis, show the same detail of it: both resolve it, and neither is
-/// more than a pyramid level coarser than the other.
-fn is_comparable(a: f32, b: f32) -> bool {
-    let (less, more) = (a.min(b), a.max(b));
-    less > MIN_RESOLVED_SHARE as f32 && more < MAX_AREA_RATIO * less
-}
-
-/// Ratio of the areas of pixels at neighbouring levels of a pyramid.
-const MAX_AREA_RATIO: f32 = 4.0;
 
 /// A wall point that a frame shows.
 struct Sample {

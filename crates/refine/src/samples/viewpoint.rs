@@ -34,8 +34,25 @@ impl Viewpoint {
     /// True if a wall point is seen with at least [`MIN_RESOLVED_SHARE`] of the area.
     #[inline]
     pub fn resolves(&self, point: &[f32; 3], normal: &Vector3<f32>) -> bool {
-        self.area_share(point, normal) > MIN_RESOLVED_SHARE as f32
+        is_resolved(self.area_share(point, normal))
     }
+}
+
+#[inline]
+fn is_resolved(area_share: f32) -> bool {
+    area_share > MIN_RESOLVED_SHARE as f32
+}
+
+/// Ratio of the areas of pixels at neighbouring levels of a pyramid.
+const MAX_AREA_RATIO: f32 = 4.0;
+
+/// True if two pictures, in which a piece of the wall has these shares of the area
+/// ([`Viewpoint::area_share`]), show the same detail of it: both resolve it, and neither is more
+/// than a pyramid level coarser than the other.
+#[inline]
+pub fn is_resolved_alike(a: f32, b: f32) -> bool {
+    let (less, more) = (a.min(b), a.max(b));
+    is_resolved(less) && more < MAX_AREA_RATIO * less
 }
 
 #[cfg(test)]
